@@ -1,0 +1,68 @@
+"""dikbench: a benchmark suite for differential inverse kinematics.
+
+A study crosses formulations with scenarios, solvers and seeds into trials; a trial is simulated
+into a trace; metrics read the trace; the store keeps one row per trial; the report reads the store.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from dikbench.errors import DikbenchError, Infeasible, SolverFailed
+    from dikbench.one_step import DikAnswer, solve_dik
+    from dikbench.problem import DikProblem, Formulation, Solve
+    from dikbench.quadratic_program import QuadraticProgram
+    from dikbench.robot import Robot
+    from dikbench.robot_catalogue import load_robot
+    from dikbench.scenario import Scenario
+    from dikbench.status import Status
+    from dikbench.tasks import LinearizedTask, PoseTask, PostureTask, Task
+
+_HOME = {
+    "DikAnswer": "one_step",
+    "DikProblem": "problem",
+    "DikbenchError": "errors",
+    "Formulation": "problem",
+    "Infeasible": "errors",
+    "LinearizedTask": "tasks",
+    "PoseTask": "tasks",
+    "PostureTask": "tasks",
+    "QuadraticProgram": "quadratic_program",
+    "Robot": "robot",
+    "Scenario": "scenario",
+    "Solve": "problem",
+    "SolverFailed": "errors",
+    "Status": "status",
+    "Task": "tasks",
+    "load_robot": "robot_catalogue",
+    "solve_dik": "one_step",
+}
+
+__all__ = [
+    "DikAnswer",
+    "DikProblem",
+    "DikbenchError",
+    "Formulation",
+    "Infeasible",
+    "LinearizedTask",
+    "PoseTask",
+    "PostureTask",
+    "QuadraticProgram",
+    "Robot",
+    "Scenario",
+    "Solve",
+    "SolverFailed",
+    "Status",
+    "Task",
+    "load_robot",
+    "solve_dik",
+]
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401
+    """Import a public name on first use, so that `dikbench --help` does not wait for Pinocchio."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'dikbench' has no attribute {name!r}")
+    return getattr(importlib.import_module(f"dikbench.{_HOME[name]}"), name)

@@ -1,0 +1,149 @@
+"""The velocity box: position, velocity and acceleration limits as bounds on one velocity.
+
+    hi = min( vmax, v_prev + a dt, gain (q_max - q)/dt, brake(q_max - q) ),   lo mirrored,
+
+all in tangent coordinates [rad/s or m/s], shape (nv,). The four ways to brake before a position
+limit at distance d, with a the deceleration that is in force:
+
+* `one-step`: gain 1, no brake: the limit is not passed within this step.
+* `gain`: a share of the distance per step (Pink 0.5, mink 0.95), no brake.
+* `sqrt`: brake = sqrt(2 a d), the continuous-time bound (Flacco, De Luca & Khatib 2012; Pink). In
+  discrete time it is not recursively feasible: kept for comparison.
+* `viable`: the largest speed from which the joint can still stop in time when q+ = q + v dt:
+  k = floor(-1/2 + sqrt(1/4 + 2 d/(a dt^2))), brake = (d/dt + a dt k (k+1)/2)/(k+1).
+
+With no acceleration limit in force `sqrt` and `viable` are `one-step`.
+
+Where the bounds contradict each other position wins over velocity, velocity over acceleration, and
+every joint whose acceleration bound was given up is counted. Outside a position limit the bound asks
+for the way back: hi = max(d/dt, -v_back) with v_back a tenth of the velocity limit.
+"""
+
+from __future__ import annotations
+
+from typing import Final, Literal, get_args
+
+import numpy as np
+
+from dikbench.array import Array
+from dikbench.errors import unknown
+from dikbench.limits import Limits
+
+Braking = Literal["one-step", "gain", "sqrt", "viable"]
+BRAKINGS: Final = get_args(Braking)
+
+FAR: Final = 1e6
+"""Distance [rad] from which a position limit brakes nothing (keeps infinity out of the formulas)."""
+
+CONFLICT: Final = 1e-9
+"""A bound given up by less than this [rad/s] is rounding, not a relaxation."""
+
+
+class Box:
+    """Bounds on the velocity of one control step.
+
+    Attributes:
+        lower, upper: (nv,) [rad/s or m/s], lower <= upper, infinite where nothing is in force.
+        relaxed: number of joints whose acceleration bound had to be given up.
+    """
+
+    __slots__ = ("lower", "relaxed", "upper")
+
+    def __init__(self, lower: Array, upper: Array, relaxed: int) -> None:
+        self.lower = lower
+        self.upper = upper
+        self.relaxed = relaxed
+
+
+def velocity_box(
+    limits: Limits,
+    v_prev: Array | None,
+    dt: float,
+    braking: Braking = "viable",
+    position_gain: float = 0.5,
+) -> Box:
+    """Compute the box at one configuration.
+
+    Args:
+        limits: the limits in force, as seen from the configuration.
+        v_prev: the velocity that was applied last, (nv,); None means no acceleration bound.
+        dt: control period [s].
+        braking: how to approach a position limit.
+        position_gain: share of the distance per step for `gain`.
+
+    Raises:
+        DikbenchError: on an unknown braking.
+    """
+    if braking not in BRAKINGS:
+        raise unknown("braking", braking, BRAKINGS)
+    joint = limits.joint
+    gain = position_gain if braking == "gain" else 1.0
+    brakes = braking in {"sqrt", "viable"} and joint.acceleration is not None
+    if limits.to_lower is None or limits.to_upper is None:
+        upper = np.full(joint.nv, np.inf)
+        lower = -upper
+    else:
+        upper = limits.to_upper * (gain / dt)
+        lower = limits.to_lower * (-gain / dt)
+        if brakes:
+            assert joint.acceleration is not None
+            slow_up, slow_down = -joint.acceleration.lower, joint.acceleration.upper
+            brake = viable_brake if braking == "viable" else sqrt_brake
+            upper = np.minimum(upper, brake(limits.to_upper, slow_up, dt))
+            lower = np.maximum(lower, -brake(limits.to_lower, slow_down, dt))
+        if limits.to_upper.min() < 0 or limits.to_lower.min() < 0:
+            _ask_for_the_way_back(limits, upper, lower, dt)
+    if joint.velocity is not None:
+        upper = np.minimum(upper, joint.velocity.upper)
+        lower = np.maximum(lower, joint.velocity.lower)
+    if joint.acceleration is None or v_prev is None:
+        return Box(lower, upper, 0)
+    return _with_acceleration(
+        lower, upper, v_prev + joint.acceleration.lower * dt, v_prev + joint.acceleration.upper * dt
+    )
+
+
+def viable_brake(distance: Array, deceleration: Array, dt: float) -> Array:
+    """Largest speed [rad/s] towards a limit at `distance` [rad] from which a joint can still stop.
+
+    Exact for q+ = q + v dt: braking by deceleration * dt per step it comes to rest on the limit or
+    before it. Infinite where the distance or the deceleration is; 0 outside the limit.
+    """
+    braked = (distance < FAR) & np.isfinite(deceleration)
+    d = np.where(braked, np.maximum(distance, 0.0), 0.0)
+    step = np.where(braked, deceleration, 1.0) * dt
+    k = np.floor(-0.5 + np.sqrt(0.25 + 2 * d / np.maximum(step * dt, np.finfo(float).tiny)))
+    speed = (d / dt + step * k * (k + 1) / 2) / (k + 1)
+    return np.where(braked, speed, np.inf)
+
+
+def sqrt_brake(distance: Array, deceleration: Array, dt: float) -> Array:
+    """Continuous-time braking speed sqrt(2 a d) [rad/s], a the deceleration, d the distance."""
+    del dt  # the continuous-time bound does not know the control period
+    braked = (distance < FAR) & np.isfinite(deceleration)
+    d = np.where(braked, np.maximum(distance, 0.0), 0.0)
+    return np.where(braked, np.sqrt(2 * np.where(braked, deceleration, 0.0) * d), np.inf)
+
+
+def _ask_for_the_way_back(limits: Limits, upper: Array, lower: Array, dt: float) -> None:
+    """Overwrite, in place, the bounds of the joints that are outside a position limit."""
+    assert limits.to_lower is not None and limits.to_upper is not None
+    above, below = limits.to_upper < 0, limits.to_lower < 0
+    upper[above] = limits.to_upper[above] / dt
+    lower[below] = -limits.to_lower[below] / dt
+    way_back = limits.joint.way_back
+    if way_back is not None:
+        up, down = way_back
+        upper[above] = np.maximum(upper[above], -down[above])
+        lower[below] = np.minimum(lower[below], up[below])
+
+
+def _with_acceleration(lower: Array, upper: Array, slowest: Array, fastest: Array) -> Box:
+    """Intersect with [slowest, fastest]; where that is empty, take the nearest velocity allowed."""
+    gap = np.maximum(slowest - upper, lower - fastest)
+    relaxed = int(np.count_nonzero(gap > CONFLICT))
+    return Box(
+        np.clip(slowest, lower, upper),
+        np.clip(fastest, lower, upper),
+        relaxed,
+    )

@@ -1,0 +1,86 @@
+"""One control step: ask the law, and stand by a fallback where it has no answer."""
+
+from __future__ import annotations
+
+from time import perf_counter_ns
+
+import numpy as np
+
+from dikbench.array import Array
+from dikbench.errors import CannotAnswer, Infeasible
+from dikbench.problem import DikProblem, Formulation
+from dikbench.solvers.checked import CheckedSolve
+from dikbench.status import Status
+
+
+class TrialEnded(Exception):
+    """A law did what ends a trial; carries the status and the message."""
+
+    def __init__(self, status: Status, message: str) -> None:
+        super().__init__(message)
+        self.status = status
+
+
+class Outcome:
+    """What came of one control step.
+
+    Attributes:
+        velocity: the law's velocity or the fallback's, (nv,) [rad/s].
+        status: `ok`, `infeasible`, `solver-failed` or `not-verified` (`stuck` is judged by the
+            motion, see `progress`).
+        law_ns: time in the law, its solver included, rechecking excluded [ns].
+    """
+
+    __slots__ = ("law_ns", "status", "velocity")
+
+    def __init__(self, velocity: Array, status: Status, law_ns: int) -> None:
+        self.velocity = velocity
+        self.status = status
+        self.law_ns = law_ns
+
+
+def control_step(formulation: Formulation, problem: DikProblem, solve: CheckedSolve) -> Outcome:
+    """Ask the law for this step's velocity.
+
+    Raises:
+        TrialEnded: if the law raises anything but `CannotAnswer`, or returns what is not a finite
+            vector (nv,).
+    """
+    solve.begin_step()
+    start = perf_counter_ns()
+    try:
+        v = formulation.velocity(problem, solve)
+    except CannotAnswer as error:
+        law_ns = perf_counter_ns() - start - solve.checking_ns
+        status = Status.INFEASIBLE if isinstance(error, Infeasible) else Status.SOLVER_FAILED
+        return Outcome(fallback(problem), status, law_ns)
+    except Exception as error:
+        message = str(error).strip().partition("\n")[0]
+        raise TrialEnded(
+            Status.FORMULATION_ERROR, f"{type(error).__name__}: {message}"
+        ) from error
+    law_ns = perf_counter_ns() - start - solve.checking_ns
+    if not isinstance(v, np.ndarray) or v.shape != (problem.robot.nv,):
+        shape = getattr(v, "shape", type(v).__name__)
+        raise TrialEnded(Status.WRONG_SHAPE, f"expected ({problem.robot.nv},), got {shape}")
+    if not np.isfinite(v).all():
+        raise TrialEnded(Status.NOT_FINITE, f"velocity {v.tolist()}")
+    return Outcome(v, Status.OK if solve.verified else Status.NOT_VERIFIED, law_ns)
+
+
+def fallback(problem: DikProblem) -> Array:
+    """Slow down uniformly: v = c v_prev, clipped to the velocity box.
+
+    c is the smallest factor in [0, 1] that no joint's acceleration limit forbids,
+    1 - min_i a_i dt / |v_prev,i|; without acceleration limits, or without v_prev, the robot stops
+    at once (outside a position limit the box then asks for the way back).
+    """
+    box = problem.box()
+    v = np.zeros(problem.robot.nv)
+    acceleration = problem.limits.joint.acceleration
+    if problem.v_prev is not None and acceleration is not None:
+        slow = np.where(problem.v_prev > 0, -acceleration.lower, acceleration.upper) * problem.dt
+        moving = np.abs(problem.v_prev) > 0
+        shares = slow[moving] / np.abs(problem.v_prev[moving])
+        v = max(0.0, 1.0 - float(shares.min(initial=1.0))) * problem.v_prev
+    return np.clip(v, box.lower, box.upper)

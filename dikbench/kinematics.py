@@ -1,0 +1,47 @@
+"""Forward kinematics and body Jacobians of one robot, computed once per control step."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.array import Array
+from dikbench.robot import Robot
+
+
+class Kinematics:
+    """The robot at one configuration: placements and Jacobians of its frames.
+
+    Attributes:
+        robot: the robot.
+        q: the configuration of the last update, shape (nq,).
+    """
+
+    __slots__ = ("_data", "_model", "q", "robot")
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self._model = robot.model
+        self._data = robot.model.createData()
+        self.q: Array = robot.q0
+
+    def update(self, q: Array) -> None:
+        """Compute everything for configuration q (nq,)."""
+        self.q = q
+        pin.computeJointJacobians(self._model, self._data, q)
+
+    def placement(self, frame: int) -> Any:  # noqa: ANN401 (a Pinocchio SE3: no stubs)
+        """Placement of a frame in the world, as a view into the data: copy it to keep it."""
+        return pin.updateFramePlacement(self._model, self._data, frame)
+
+    def jacobian(self, frame: int) -> Array:
+        """Body Jacobian of a frame, (6, nv), rows (linear; angular) in the frame's own axes."""
+        J: Array = pin.getFrameJacobian(self._model, self._data, frame, pin.LOCAL)
+        return J
+
+
+def smallest_singular_value(J: Array) -> float:
+    """The smallest of the min(m, n) singular values of a task Jacobian (m, n)."""
+    return float(np.linalg.svd(J, compute_uv=False)[-1])

@@ -1,0 +1,122 @@
+"""The limits of a robot's joints, and how far one configuration is from them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from dikbench.array import Array, Indices
+from dikbench.errors import DikbenchError
+
+NO_LIMIT = 1e20
+"""Magnitudes above this mean "no limit": some models carry the largest double instead of inf."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Interval:
+    """A lower and an upper bound per joint, shape (nv,) each; infinite where there is none."""
+
+    lower: Array
+    upper: Array
+
+
+@dataclass(frozen=True, eq=False)
+class JointLimits:
+    """What a robot's joints may do, in tangent coordinates; a kind not in force is None.
+
+    Attributes:
+        nv: number of velocities.
+        q_index: index into q of each velocity's coordinate, shape (nv,); 0 where the joint has no
+            position limit (continuous joints, free-flyers).
+        position: bounds on that coordinate [rad or m], or None.
+        velocity: bounds [rad/s or m/s], or None.
+        acceleration: bounds [rad/s^2 or m/s^2], or None.
+        effort: bounds [N m or N], or None.
+    """
+
+    nv: int
+    q_index: Indices
+    position: Interval | None
+    velocity: Interval | None
+    acceleration: Interval | None
+    effort: Interval | None
+
+    def with_interval(self, kind: str, value: object) -> JointLimits:
+        """Replace one kind of limit.
+
+        Args:
+            kind: "position", "velocity", "acceleration" or "effort".
+            value: None (not in force), a magnitude for all joints or one per joint (symmetric),
+                or a pair (lower, upper) of such.
+
+        Raises:
+            DikbenchError: on a wrong shape, NaN, a lower bound above the upper one, or (but for
+                positions) an interval that does not contain zero.
+        """
+        if value is None:
+            return replace(self, **{kind: None})
+        if isinstance(value, tuple):
+            if len(value) != 2:
+                raise DikbenchError(
+                    f"{kind} limit: a tuple means (lower, upper), got {len(value)} entries"
+                )
+            lower, upper = (self._vector(kind, side) for side in value)
+        else:
+            upper = self._vector(kind, value)
+            lower = -upper
+        if np.any(lower > upper):
+            raise DikbenchError(f"{kind} limit: a lower bound is above its upper bound")
+        if kind != "position" and (np.any(lower > 0) or np.any(upper < 0)):
+            raise DikbenchError(f"{kind} limit: every interval must contain zero (rest)")
+        return replace(self, **{kind: Interval(lower, upper)})
+
+    def _vector(self, kind: str, value: object) -> Array:
+        try:
+            vector = np.asarray(value, dtype=float)
+            if vector.ndim == 0:
+                vector = np.full(self.nv, float(vector))
+        except (TypeError, ValueError):
+            raise DikbenchError(f"{kind} limit: expected numbers, got {value!r}") from None
+        if vector.shape != (self.nv,) or np.isnan(vector).any():
+            raise DikbenchError(
+                f"{kind} limit: expected a number or {self.nv} numbers without NaN, "
+                f"got shape {vector.shape}"
+            )
+        return np.where(np.abs(vector) > NO_LIMIT, np.sign(vector) * np.inf, vector)
+
+    @cached_property
+    def way_back(self) -> tuple[Array, Array] | None:
+        """Largest speeds at which a violated lower and upper position limit is left [rad/s].
+
+        A tenth of the velocity limit towards the inside; None where no velocity limit is in force.
+        """
+        if self.velocity is None:
+            return None
+        return 0.1 * self.velocity.upper, -0.1 * self.velocity.lower
+
+    def at(self, q: Array) -> Limits:
+        """The limits as seen from configuration q (nq,)."""
+        if self.position is None:
+            return Limits(self, None, None)
+        x = q[self.q_index]
+        return Limits(self, x - self.position.lower, self.position.upper - x)
+
+
+class Limits:
+    """What the robot may do here: the limits of its joints as seen from one configuration.
+
+    Attributes:
+        joint: the limits in force (velocity, acceleration, effort).
+        to_lower: distance to the lower position limits in the tangent space, q - q_min [rad or m],
+            shape (nv,); negative outside; None where position limits are not in force.
+        to_upper: likewise q_max - q.
+    """
+
+    __slots__ = ("joint", "to_lower", "to_upper")
+
+    def __init__(self, joint: JointLimits, to_lower: Array | None, to_upper: Array | None) -> None:
+        self.joint = joint
+        self.to_lower = to_lower
+        self.to_upper = to_upper

@@ -1,0 +1,27 @@
+"""Dense factorisations of the size of a robot arm, through LAPACK without numpy's wrappers."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg.lapack import dgesdd, dposv
+
+from dikbench.array import Array
+
+
+def pseudo_inverse(A: Array, tolerance: float) -> Array:
+    """Moore-Penrose inverse (n, m) of A (m, n), singular values up to `tolerance` taken as zero.
+
+    The tolerance is absolute, in the units of A: a relative one blows up where A itself vanishes.
+    """
+    U, singular, Vt, _ = dgesdd(A, full_matrices=0)
+    kept = singular > tolerance
+    inverse = np.zeros_like(singular)
+    inverse[kept] = 1.0 / singular[kept]
+    result: Array = (Vt.T * inverse) @ U.T
+    return result
+
+
+def solve_positive_definite(A: Array, b: Array) -> Array | None:
+    """x with A x = b for a symmetric positive definite A (n, n); None where A is not."""
+    _, x, info = dposv(A, b)
+    return x if info == 0 else None

@@ -1,0 +1,46 @@
+"""A planar arm of any number of links, built in code: the smallest robot that has everything."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+
+def planar_arm(
+    lengths: tuple[float, ...], *, velocity_limit: float, position_limit: float = 2.8
+) -> Any:  # noqa: ANN401 (a Pinocchio model: no stubs)
+    """Build a chain of revolute joints about z, with links along x.
+
+    Args:
+        lengths: length of each link [m].
+        velocity_limit: of every joint [rad/s].
+        position_limit: of every joint, to both sides [rad].
+
+    Returns:
+        A Pinocchio model with the frame `tip` at the end of the last link. Every link weighs
+        1 kg, spread evenly along it.
+    """
+    model = pin.Model()
+    model.name = f"planar{len(lengths)}r"
+    parent, placement = 0, pin.SE3.Identity()
+    for number, length in enumerate(lengths, start=1):
+        parent = model.addJoint(
+            parent,
+            pin.JointModelRZ(),
+            placement,
+            f"joint{number}",
+            np.array([100.0]),
+            np.array([velocity_limit]),
+            np.array([-position_limit]),
+            np.array([position_limit]),
+        )
+        model.appendBodyToJoint(
+            parent,
+            pin.Inertia.FromCylinder(1.0, 0.02, length),
+            pin.SE3(pin.utils.rotate("y", np.pi / 2), np.array([length / 2, 0.0, 0.0])),
+        )
+        placement = pin.SE3(np.eye(3), np.array([length, 0.0, 0.0]))
+    model.addFrame(pin.Frame("tip", parent, 0, placement, pin.FrameType.OP_FRAME))
+    return model

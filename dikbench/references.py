@@ -1,0 +1,97 @@
+"""Reference motions: where the task frame should be at every nominal instant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.array import Array
+from dikbench.robot import Robot
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """A path of the task frame, parametrised by nominal time tau in [0, duration] [s].
+
+    A time-indexed run has tau = t; a path-indexed one advances tau by the progress achieved.
+
+    Attributes:
+        duration: nominal time from end to end [s]; a target at rest has no path and is held as
+            long as the scenario lasts.
+        placement: tau -> placement X_d in the world (`pinocchio.SE3`).
+        velocity: tau -> body twist V_d at nominal speed, (6,) [m/s; rad/s], in the axes of X_d.
+        moving: whether there is a path at all.
+    """
+
+    duration: float
+    placement: Callable[[float], Any]
+    velocity: Callable[[float], Array]
+    moving: bool = True
+
+
+def target_at_rest(target: Any, duration: float) -> Reference:  # noqa: ANN401
+    """A placement that is wanted from the first instant on (a step)."""
+    zero = np.zeros(6)
+    return Reference(duration, lambda tau: target, lambda tau: zero, moving=False)
+
+
+def screw_path(middle: Any, twist: Array, duration: float) -> Reference:  # noqa: ANN401
+    """A constant body twist (6,) through `middle`, which it passes at half the duration.
+
+    X_d(tau) = middle exp6((tau - duration/2) twist).
+    """
+
+    def placement(tau: float) -> Any:  # noqa: ANN401
+        return middle * pin.exp6(pin.Motion((tau - duration / 2) * twist))
+
+    return Reference(duration, placement, lambda tau: twist)
+
+
+def joint_path(
+    robot: Robot,
+    configuration: Callable[[float], Array],
+    velocity: Callable[[float], Array],
+    duration: float,
+) -> Reference:
+    """The motion of the task frame along a joint motion: tau -> q (nq,), tau -> dq/dtau (nv,)."""
+    model, frame = robot.model, robot.frame_id
+    data = model.createData()
+
+    def placement(tau: float) -> Any:  # noqa: ANN401
+        pin.forwardKinematics(model, data, configuration(tau))
+        return pin.updateFramePlacement(model, data, frame).copy()
+
+    def twist(tau: float) -> Array:
+        J = pin.computeFrameJacobian(model, data, configuration(tau), frame, pin.LOCAL)
+        V: Array = J @ velocity(tau)
+        return V
+
+    return Reference(duration, placement, twist)
+
+
+def circle(start: Any, radius: float, period: float, laps: float) -> Reference:  # noqa: ANN401
+    """A circle in the world's y-z plane through `start`, orientation fixed.
+
+    Args:
+        start: placement at tau = 0, the lowest point of the circle.
+        radius: [m].
+        period: nominal time of a lap [s].
+        laps: number of laps.
+    """
+    rotation = start.rotation.copy()
+    centre = start.translation + np.array([0.0, 0.0, radius])
+    rate = 2 * np.pi / period
+
+    def placement(tau: float) -> Any:  # noqa: ANN401
+        offset = np.array([0.0, np.sin(rate * tau), -np.cos(rate * tau)])
+        return pin.SE3(rotation, centre + radius * offset)
+
+    def velocity(tau: float) -> Array:
+        world = radius * rate * np.array([0.0, np.cos(rate * tau), np.sin(rate * tau)])
+        return np.concatenate([rotation.T @ world, np.zeros(3)])
+
+    return Reference(laps * period, placement, velocity)

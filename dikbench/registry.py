@@ -1,0 +1,241 @@
+"""Formulations and scenario families, found through entry points; selectors turned into objects.
+
+A plug-in names a module in the entry-point group `dikbench.formulations` or `dikbench.scenarios`;
+the module holds a table `FORMULATIONS` (name -> class) or `SCENARIOS` (name -> family).
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import importlib.util
+import inspect
+import sys
+import typing
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, is_dataclass, replace
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+
+from dikbench.errors import DikbenchError, unknown
+from dikbench.problem import Formulation
+from dikbench.scenario import Scenario
+from dikbench.selector import Selector, parse_selector
+
+Kind = Literal["formulation", "scenario"]
+
+
+@dataclass(frozen=True)
+class Plugin:
+    """A formulation or a scenario family as it was registered.
+
+    Attributes:
+        name: the name in the table.
+        build: the class or function that is called with the parameters.
+        file: the file that it comes from.
+    """
+
+    name: str
+    build: Callable[..., Any]
+    file: str
+
+    @property
+    def summary(self) -> str:
+        """The first line of its docstring."""
+        text = inspect.getdoc(_target(self.build)) or ""
+        return text.partition("\n")[0]
+
+    @property
+    def source(self) -> str:
+        """The paper that it names as its source."""
+        return str(getattr(_target(self.build), "source", ""))
+
+    @property
+    def parameters(self) -> Mapping[str, inspect.Parameter]:
+        """Its parameters, with their defaults."""
+        return {
+            name: parameter
+            for name, parameter in inspect.signature(_target(self.build)).parameters.items()
+            if parameter.kind not in {parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD}
+        }
+
+
+@lru_cache
+def plugins(kind: Kind) -> Mapping[str, Plugin]:
+    """Every registered plug-in of a kind, by name.
+
+    Raises:
+        DikbenchError: if there is none (dikbench is not installed), a module has no table, or two
+            plug-ins share a name.
+    """
+    group = f"dikbench.{kind}s"
+    table_name = f"{kind.upper()}S"
+    found: dict[str, Plugin] = {}
+    for entry_point in importlib.metadata.entry_points(group=group):
+        try:
+            module = entry_point.load()
+        except Exception as error:
+            raise DikbenchError(
+                f"plug-in {entry_point.name!r} of {group} ({entry_point.value}) cannot be imported: "
+                f"{type(error).__name__}: {error}"
+            ) from error
+        file = getattr(module, "__file__", None) or repr(module)
+        table = getattr(module, table_name, None)
+        if not isinstance(table, Mapping):
+            raise DikbenchError(
+                f"plug-in {entry_point.name!r} of {group}: {file} holds no mapping {table_name}"
+            )
+        for name, build in table.items():
+            plugin = _checked(kind, name, build, file)
+            if name in found and found[name].build is not plugin.build:
+                raise DikbenchError(
+                    f"two plug-ins are called {name!r}: {found[name].file} and {plugin.file}"
+                )
+            found[name] = plugin
+    if not found:
+        raise DikbenchError(
+            f"no {kind}s are registered: dikbench is not installed here; "
+            "run pip install -e . in its checkout"
+        )
+    return found
+
+
+def _checked(kind: Kind, name: object, build: object, file: str) -> Plugin:
+    if not isinstance(name, str) or set(name) & set("[],= \t\n"):
+        raise DikbenchError(f"{file}: {name!r} is not a name (no brackets, commas or spaces)")
+    if kind == "formulation" and not isinstance(build, type) and is_dataclass(build):
+        build = partial(replace, build)  # a law with its parameters set: they are the defaults
+    if not callable(build):
+        raise DikbenchError(f"{file}: {kind} {name!r} is not callable")
+    target = _target(build)
+    if kind == "formulation" and not callable(getattr(target, "velocity", None)):
+        raise DikbenchError(f"{file}: formulation {name!r} has no method velocity(problem, solve)")
+    try:
+        own_file = inspect.getsourcefile(target) or file
+    except TypeError:
+        own_file = file
+    return Plugin(name, build, own_file)
+
+
+def make_formulation(text: str) -> Formulation:
+    """Build a law from `name[parameter=value,...]` or `path/to/file.py:Class[...]`.
+
+    Raises:
+        DikbenchError: on an unknown name, file, class or parameter, or a value out of range.
+    """
+    selector = parse_selector(text)
+    plugin = formulation_plugin(selector.name)
+    formulation: Formulation = _build("formulation", plugin, selector, {})
+    return formulation
+
+
+def formulation_plugin(name: str) -> Plugin:
+    """The plug-in behind a formulation's name or `path/to/file.py:Class`."""
+    path, colon, class_name = name.rpartition(":")
+    if colon and path.endswith(".py"):
+        return _checked("formulation", class_name, _class_from_file(path, class_name), path)
+    known = plugins("formulation")
+    if name not in known:
+        raise unknown("formulation", name, known, "(or give path/to/file.py:Class)")
+    return known[name]
+
+
+def make_scenario(text: str, seed: int = 0) -> Scenario:
+    """Build the scenario of a selector and a seed; its certificate is asserted.
+
+    Raises:
+        DikbenchError: on an unknown family or parameter, a value out of range, or a certificate
+            that does not hold.
+    """
+    selector = parse_selector(text)
+    plugin = scenario_plugin(selector.name)
+    if "seed" in selector.parameters:
+        raise DikbenchError(f"scenario {text!r}: the seed is not a parameter; use --seed")
+    extra: dict[str, Any] = {"seed": seed} if "seed" in plugin.parameters else {}
+    if seed and not extra:
+        raise DikbenchError(f"scenario family {selector.name!r} takes no seed; valid: 0")
+    scenario: Scenario = _build("scenario", plugin, selector, extra)
+    if not isinstance(scenario, Scenario):
+        raise DikbenchError(
+            f"{plugin.file}: scenario {selector.name!r} returned {type(scenario).__name__}, "
+            "not a Scenario"
+        )
+    scenario.certificate.check(text)
+    return scenario
+
+
+def scenario_plugin(name: str) -> Plugin:
+    """The plug-in behind a scenario family's name."""
+    known = plugins("scenario")
+    if name not in known:
+        raise unknown("scenario", name, known)
+    return known[name]
+
+
+def _target(build: Any) -> Any:  # noqa: ANN401
+    """The class or function behind a table's entry."""
+    return type(build.args[0]) if isinstance(build, partial) else build
+
+
+def _build(kind: Kind, plugin: Plugin, selector: Selector, extra: Mapping[str, Any]) -> Any:  # noqa: ANN401
+    """Call a plug-in with the selector's parameters, converted to the types it declares."""
+    parameters = plugin.parameters
+    types = _annotations(plugin.build)
+    values = dict(extra)
+    for name, text in selector.parameters.items():
+        if name not in parameters:
+            raise unknown(f"parameter of {kind} {plugin.name}", name, set(parameters) - {"seed"})
+        wanted = types.get(name, str)
+        try:
+            values[name] = msgspec.convert(text, wanted, strict=False)
+        except msgspec.ValidationError as error:
+            raise DikbenchError(
+                f"{kind} {plugin.name}: {name}={text!r} is not valid: {_reason(error, wanted)}"
+            ) from None
+    missing = [
+        name
+        for name, parameter in parameters.items()
+        if parameter.default is parameter.empty and name not in values
+    ]
+    if missing:
+        raise DikbenchError(f"{kind} {plugin.name}: parameter {missing[0]!r} must be given")
+    return plugin.build(**values)
+
+
+def _annotations(build: Callable[..., Any]) -> Mapping[str, Any]:
+    target = _target(build)
+    target = target.__init__ if isinstance(target, type) else target
+    try:
+        return typing.get_type_hints(target)
+    except (NameError, TypeError):
+        return {}
+
+
+def _reason(error: msgspec.ValidationError, wanted: Any) -> str:  # noqa: ANN401
+    choices = typing.get_args(wanted) if typing.get_origin(wanted) is Literal else ()
+    return "valid: " + ", ".join(map(str, choices)) if choices else str(error)
+
+
+@lru_cache
+def _class_from_file(path: str, class_name: str) -> type:
+    """Import a file that the user named on the command line and take a class out of it."""
+    file = Path(path)
+    if not file.is_file():
+        raise DikbenchError(f"formulation file not found: {path}")
+    spec = importlib.util.spec_from_file_location(f"dikbench_user_{file.stem}", file)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclasses and pickle look it up there
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise DikbenchError(
+            f"formulation file {path} cannot be imported: {type(error).__name__}: {error}"
+        ) from error
+    found = getattr(module, class_name, None)
+    if not isinstance(found, type):
+        classes = [name for name, value in vars(module).items() if isinstance(value, type)]
+        raise unknown("class", class_name, classes, f"in {path}")
+    return found

@@ -1,0 +1,1 @@
+"""Solvers of quadratic and linear programs: names, interfaces, and the checked call."""

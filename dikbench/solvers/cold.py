@@ -1,0 +1,55 @@
+"""The cold interface: one call of qpsolvers per program, as most people use solvers."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any, Final
+
+import numpy as np
+import qpsolvers
+from scipy.sparse import csc_matrix
+
+from dikbench.quadratic_program import QuadraticProgram
+from dikbench.solvers.answer import Answer
+from dikbench.solvers.catalogue import Solver
+
+SPARSE: Final = frozenset({"osqp", "clarabel", "highs"})
+"""Back ends that take sparse matrices; handing them over dense costs a warning and a conversion."""
+
+# A failure is in the answer; a warning beside each would drown the run.
+warnings.filterwarnings("ignore", module=r"qpsolvers\.")
+
+
+class ColdSolver:
+    """A back end called afresh for every program."""
+
+    __slots__ = ("_name", "_settings", "_sparse")
+
+    def __init__(self, solver: Solver) -> None:
+        self._name = solver.name
+        self._settings = dict(solver.settings)
+        self._sparse = solver.name in SPARSE
+
+    def __call__(self, program: QuadraticProgram) -> Answer:
+        """Solve a program; a failure of any kind is an answer that claims nothing."""
+        problem = qpsolvers.Problem(
+            self._matrix(program.P),
+            program.q,
+            self._matrix(program.G),
+            program.h,
+            self._matrix(program.A),
+            program.b,
+            program.lb,
+            program.ub,
+        )
+        try:
+            solution = qpsolvers.solve_problem(problem, solver=self._name, **self._settings)
+        except (qpsolvers.exceptions.QPError, ValueError, RuntimeError):
+            return Answer(None, claimed=False)
+        x = solution.x
+        claimed = bool(solution.found) and x is not None and bool(np.isfinite(x).all())
+        core_ns = int(1e9 * (solution.solve_time or 0.0))
+        return Answer(x, claimed, solution.y, solution.z, solution.z_box, core_ns)
+
+    def _matrix(self, M: Any) -> Any:  # noqa: ANN401 (dense or sparse, as the back end wants it)
+        return csc_matrix(M) if self._sparse and M is not None else M

@@ -1,0 +1,27 @@
+"""Whether a program has any feasible point: the judge between a hard program and a bad solver."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import linprog
+
+from dikbench.quadratic_program import QuadraticProgram
+
+
+def is_feasible(program: QuadraticProgram) -> bool:
+    """Find a feasible point by the simplex method (HiGHS, feasibility tolerance 1e-7)."""
+    n = len(program.q)
+    lower = np.full(n, -np.inf) if program.lb is None else program.lb
+    upper = np.full(n, np.inf) if program.ub is None else program.ub
+    if np.any(lower > upper):
+        return False
+    result = linprog(
+        np.zeros(n),
+        A_ub=program.G,
+        b_ub=program.h,
+        A_eq=program.A,
+        b_eq=program.b,
+        bounds=np.column_stack([lower, upper]),
+        method="highs",
+    )
+    return bool(result.status == 0)

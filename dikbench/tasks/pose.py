@@ -1,0 +1,96 @@
+"""A frame at a wanted placement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.array import Array
+from dikbench.kinematics import Kinematics
+from dikbench.robot import frame_id
+from dikbench.tasks.task import LinearizedTask
+
+
+@dataclass(frozen=True, eq=False)
+class PoseTask:
+    """Bring a frame of the robot to a placement in the world.
+
+        e = log6(X^-1 X_d),   V = Ad(X^-1 X_d) V_d + gain e,   J v = V
+
+    with X the placement of the frame, X_d the target, V_d the target's own body twist and J the
+    body Jacobian: twists are (linear; angular) [m/s; rad/s] in the axes of the frame. On an arm
+    that cannot move some rows of the twist at all (`Robot.task_rows`) those rows are left out.
+
+    Attributes:
+        target: placement X_d (`pinocchio.SE3`); None: given to `linearize` at every step.
+        gain: 1/s.
+        weight: see `LinearizedTask`.
+        priority: see `LinearizedTask`.
+        frame: name of the frame; None: the robot's task frame.
+    """
+
+    target: Any = None
+    gain: float = 1.0
+    weight: float | Array = 1.0
+    priority: int = 1
+    frame: str | None = None
+
+    def linearize(
+        self, kinematics: Kinematics, target: Any = None, velocity: Array | None = None
+    ) -> LinearizedTask:  # noqa: ANN401 (a Pinocchio SE3: no stubs)
+        """The task at the configuration of `kinematics`.
+
+        Args:
+            kinematics: the robot at its configuration.
+            target: this step's placement; default: the task's own.
+            velocity: the target's body twist V_d, (6,), or None for a target at rest.
+        """
+        robot = kinematics.robot
+        index = robot.frame_id if self.frame is None else frame_id(robot.model, self.frame)
+        X_d = self.target if target is None else target
+        relative = kinematics.placement(index).actInv(X_d)
+        error: Array = pin.log6(relative).np
+        V = self.gain * error
+        if velocity is not None:
+            V = V + relative.toActionMatrix() @ velocity
+        J = kinematics.jacobian(index)
+        if len(robot.task_rows) == 6:
+            return LinearizedPose(J, V, error, self.weight, self.priority, relative, None)
+        rows = np.array(robot.task_rows)
+        return LinearizedPose(
+            J[rows], V[rows], error[rows], self.weight, self.priority, relative, rows
+        )
+
+
+class LinearizedPose(LinearizedTask):
+    """A pose task at one configuration.
+
+    Attributes:
+        relative: X^-1 X_d, the target seen from the frame.
+        rows: the rows of the twist that are kept; None: all six.
+    """
+
+    __slots__ = ("relative", "rows")
+
+    def __init__(
+        self,
+        J: Array,
+        V: Array,
+        error: Array,
+        weight: float | Array,
+        priority: int,
+        relative: Any,  # noqa: ANN401 (a Pinocchio SE3: no stubs)
+        rows: Any,  # noqa: ANN401
+    ) -> None:
+        super().__init__(J, V, error, weight, priority)
+        self.relative = relative
+        self.rows = rows
+
+    @property
+    def log_derivative(self) -> Array | None:
+        """Jlog6(X_d^-1 X), (m, m)."""
+        Jl: Array = pin.Jlog6(self.relative.inverse())
+        return Jl if self.rows is None else Jl[np.ix_(self.rows, self.rows)]

@@ -1,0 +1,53 @@
+"""A posture that the joints should take."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.array import Array
+from dikbench.errors import DikbenchError
+from dikbench.kinematics import Kinematics
+from dikbench.robot import Robot
+from dikbench.tasks.task import LinearizedTask
+
+
+@dataclass(frozen=True, eq=False)
+class PostureTask:
+    """Bring the joints to a posture: e = q* (-) q, v = gain e (J = I).
+
+    Attributes:
+        target: the posture q*, (nq,).
+        gain: 1/s.
+        weight: see `LinearizedTask`.
+        priority: see `LinearizedTask`; by default below the task of the end effector.
+    """
+
+    target: Array
+    gain: float = 1.0
+    weight: float | Array = 1.0
+    priority: int = 2
+
+    def linearize(self, kinematics: Kinematics) -> LinearizedTask:
+        """The task at the configuration of `kinematics`."""
+        robot = kinematics.robot
+        error: Array = pin.difference(robot.model, kinematics.q, self.target)
+        return LinearizedTask(
+            np.eye(robot.nv), self.gain * error, error, self.weight, self.priority
+        )
+
+
+def middle_posture(robot: Robot) -> Array:
+    """The middle of the position limits, (nq,), the target of joint centring.
+
+    Raises:
+        DikbenchError: if a joint has no position limits.
+    """
+    position = robot.limits.position
+    if position is None or not np.isfinite(position.upper - position.lower).all():
+        raise DikbenchError(f"robot {robot.name}: not every joint has position limits to centre")
+    middle = robot.q0.copy()
+    middle[robot.limits.q_index] = (position.lower + position.upper) / 2
+    return middle

@@ -1,0 +1,89 @@
+"""A task and its linearisation at one configuration."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+import scipy.linalg
+
+from dikbench.array import Array
+from dikbench.kinematics import Kinematics
+
+
+class LinearizedTask:
+    """A task at one configuration: J v = V.
+
+    Attributes:
+        J: task Jacobian, (m, nv).
+        V: wanted task velocity, (m,) [m/s; rad/s]: gain times error plus feed-forward.
+        error: task error, (m,) [m; rad], zero when the task is done.
+        weight: multiplies the squared norm ||J v - V||^2 where tasks compete: one number, or one
+            per row (m,).
+        priority: 1 is the most important.
+    """
+
+    __slots__ = ("J", "V", "error", "priority", "weight")
+
+    def __init__(
+        self, J: Array, V: Array, error: Array, weight: float | Array = 1.0, priority: int = 1
+    ) -> None:
+        self.J = J
+        self.V = V
+        self.error = error
+        self.weight = weight
+        self.priority = priority
+
+    @property
+    def log_derivative(self) -> Array | None:
+        """The (m, m) matrix Jl of d(error)/dt = -Jl J v; None where it is the identity.
+
+        Multiplying both sides of J v = V by it changes nothing for one full-rank task without
+        active bounds (Jl e = e), and something under damping, competing weights, rank loss.
+        """
+        return None
+
+
+class Task(Protocol):
+    """What is wanted: a frozen dataclass with at least these fields."""
+
+    @property
+    def priority(self) -> int:
+        """1 is the most important."""
+        ...
+
+    def linearize(self, kinematics: Kinematics) -> LinearizedTask:
+        """The task at the configuration of `kinematics`."""
+        ...
+
+
+def stacked(tasks: list[LinearizedTask]) -> LinearizedTask:
+    """Several tasks of one priority as one task, rows below each other."""
+    if len(tasks) == 1:
+        return tasks[0]
+    stack = _StackedTask(
+        np.vstack([t.J for t in tasks]),
+        np.concatenate([t.V for t in tasks]),
+        np.concatenate([t.error for t in tasks]),
+        np.concatenate([np.broadcast_to(t.weight, t.V.shape) for t in tasks]),
+        tasks[0].priority,
+    )
+    stack.parts = tasks
+    return stack
+
+
+class _StackedTask(LinearizedTask):
+    __slots__ = ("parts",)
+    parts: list[LinearizedTask]
+
+    @property
+    def log_derivative(self) -> Array | None:
+        blocks = [part.log_derivative for part in self.parts]
+        if all(block is None for block in blocks):
+            return None
+        filled = [
+            np.eye(len(part.V)) if block is None else block
+            for part, block in zip(self.parts, blocks, strict=True)
+        ]
+        matrix: Array = scipy.linalg.block_diag(*filled)
+        return matrix

@@ -1,0 +1,28 @@
+"""The control laws, one per file: (problem, solve) -> velocity.
+
+A new law is a file beside these and a line in this table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from dikbench.problem import Formulation
+from formulations.damped_least_squares import DampedLeastSquares
+from formulations.lp_alpha import LpAlpha
+from formulations.lp_alpha_cvxpy import LpAlphaCvxpy
+from formulations.nullspace import Nullspace
+from formulations.pseudo_inverse import PseudoInverse
+from formulations.weighted_qp import WeightedQp
+
+FORMULATIONS: Mapping[str, type[Formulation]] = MappingProxyType(
+    {
+        "pinv": PseudoInverse,
+        "dls": DampedLeastSquares,
+        "nullspace": Nullspace,
+        "qp": WeightedQp,
+        "lp-alpha": LpAlpha,
+        "lp-alpha-cvxpy": LpAlphaCvxpy,
+    }
+)

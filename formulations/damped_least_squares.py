@@ -1,0 +1,51 @@
+"""Damped least squares."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from dikbench.array import Array
+from dikbench.errors import DikbenchError
+from dikbench.linear_algebra import pseudo_inverse, solve_positive_definite
+from dikbench.problem import DikProblem, Solve
+
+
+@dataclass(frozen=True)
+class DampedLeastSquares:
+    """Damped least squares: trade tracking for speed near singularities.
+
+        min ||J v - V||^2 + lambda^2 ||v||^2,   v = J^T (J J^T + lambda^2 I)^-1 V
+
+    J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s. Bounded by
+    ||V|| / (2 lambda), never exact, and knows no limits.
+
+    Attributes:
+        damping: lambda, unsquared (units of J); 0.01-0.05 in the recent literature.
+
+    Source: Wampler (1986); Nakamura & Hanafusa (1986), Inverse kinematic solutions with
+    singularity robustness for robot manipulator control.
+    """
+
+    damping: float = 0.05
+
+    source: ClassVar[str] = "Wampler 1986; Nakamura & Hanafusa 1986"
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        if not self.damping >= 0:
+            raise DikbenchError("dls: damping must be at least 0")
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        task = problem.primary
+        J = task.J
+        damped = J @ J.T
+        damped.flat[:: len(damped) + 1] += self.damping**2
+        y = solve_positive_definite(damped, task.V)
+        if y is None:  # only without damping, at an exact singularity
+            v: Array = pseudo_inverse(J, np.finfo(float).eps) @ task.V
+            return v
+        return J.T @ y

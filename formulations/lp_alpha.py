@@ -1,0 +1,77 @@
+"""Scale the wanted motion down until it is feasible, as a linear program."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from dikbench.array import Array
+from dikbench.box import Box, Braking
+from dikbench.errors import DikbenchError
+from dikbench.problem import DikProblem, LimitKind, Solve
+from dikbench.quadratic_program import Program, QuadraticProgram
+from dikbench.tasks.task import LinearizedTask
+
+
+@dataclass(frozen=True)
+class LpAlpha:
+    """Alpha scaling: go in the wanted direction, as fast as the limits allow.
+
+        max_(v, alpha)  alpha - 1/2 rho ||v||^2
+        s.t.            J v = alpha V,   0 <= alpha <= 1,   lo <= v <= hi   (the velocity box)
+
+    J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s. A linear program
+    where rho = 0; its vertices are not unique where the arm has a null space and v then chatters,
+    which a small rho cures. Never off course and inside every limit; slows down, and stops where
+    the wanted direction is lost.
+
+    Attributes:
+        regularization: rho; None: 1e-4 where the arm has more joints than the task has rows, else 0.
+        braking: how the box approaches a position limit (see `dikbench.box`).
+
+    Source: Tedrake, Robotic Manipulation, ch. 3 (differential inverse kinematics in Drake).
+    """
+
+    regularization: float | None = None
+    braking: Braking = "viable"
+
+    program: ClassVar[Program] = "lp"
+    keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
+    source: ClassVar[str] = "Tedrake, Robotic Manipulation, ch. 3"
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        if self.regularization is not None and not self.regularization >= 0:
+            raise DikbenchError("lp-alpha: regularization must be at least 0")
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        task = problem.primary
+        rho = regularization_for(task, self.regularization)
+        x = solve(alpha_program(task, problem.box(self.braking), rho))
+        return x[: problem.robot.nv]
+
+
+def regularization_for(task: LinearizedTask, given: float | None) -> float:
+    """The weight rho: as given, else 1e-4 where the task leaves joints free and 0 elsewhere."""
+    if given is not None:
+        return given
+    m, n = task.J.shape
+    return 1e-4 if n > m else 0.0
+
+
+def alpha_program(task: LinearizedTask, box: Box, regularization: float) -> QuadraticProgram:
+    """The program of `LpAlpha` in matrices, in x = (v, alpha), shape (nv + 1,)."""
+    m, n = task.J.shape
+    P = np.zeros((n + 1, n + 1))
+    P.flat[: n * (n + 2) : n + 2] = regularization
+    q = np.zeros(n + 1)
+    q[n] = -1.0
+    A = np.empty((m, n + 1))
+    A[:, :n] = task.J
+    A[:, n] = -task.V
+    lower, upper = np.zeros(n + 1), np.ones(n + 1)
+    lower[:n], upper[:n] = box.lower, box.upper
+    return QuadraticProgram(P, q, A=A, b=np.zeros(m), lb=lower, ub=upper)

@@ -1,0 +1,61 @@
+"""Resolved rate control with the pseudo-inverse."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from dikbench.array import Array
+from dikbench.errors import DikbenchError
+from dikbench.linear_algebra import pseudo_inverse
+from dikbench.problem import DikProblem, LimitKind, Solve
+
+
+@dataclass(frozen=True)
+class PseudoInverse:
+    """Resolved-rate control: the least-norm velocity that does the task.
+
+        v = J^+ V,   then   none:  v
+                            clip:  min(max(v, v_min), v_max) joint by joint
+                            scale: s v with the largest s <= 1 inside the velocity limits
+
+    J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s. Exact where the task
+    is feasible, unbounded near a singularity; clipping leaves the course, scaling slows down.
+
+    Attributes:
+        after: what to do with a velocity outside the limits.
+        rank_tolerance: singular values up to this count as zero (absolute, units of J).
+
+    Source: Whitney (1969), Resolved motion rate control of manipulators and human prostheses.
+    """
+
+    after: Literal["none", "clip", "scale"] = "none"
+    rank_tolerance: float = 1e-6
+
+    source: ClassVar[str] = "Whitney 1969"
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        if self.rank_tolerance < 0:
+            raise DikbenchError("pinv: rank_tolerance must be at least 0")
+
+    @property
+    def keeps(self) -> frozenset[LimitKind]:
+        """The velocity limits, unless nothing is done after the inverse."""
+        return frozenset() if self.after == "none" else frozenset({"velocity"})
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        task = problem.primary
+        v: Array = pseudo_inverse(task.J, self.rank_tolerance) @ task.V
+        limit = problem.limits.joint.velocity
+        if self.after == "none" or limit is None:
+            return v
+        if self.after == "clip":
+            return np.clip(v, limit.lower, limit.upper)
+        # How often the nearer bound fits into each velocity; below 1 the smallest is the scale.
+        bound = np.where(v > 0, limit.upper, -limit.lower)
+        excess = float(np.max(np.abs(v) / np.maximum(bound, np.finfo(float).tiny)))
+        return v / max(1.0, excess)

@@ -1,0 +1,71 @@
+"""The weighted quadratic program with limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from dikbench.array import Array
+from dikbench.box import Braking
+from dikbench.errors import DikbenchError
+from dikbench.problem import DikProblem, LimitKind, Solve
+from dikbench.quadratic_program import Program, QuadraticProgram
+
+
+@dataclass(frozen=True)
+class WeightedQp:
+    """Weighted quadratic program: all tasks at once, inside the limits.
+
+        min_v  sum_i 1/2 ||J_i v - V_i||^2_(W_i) + 1/2 lambda^2 ||v||^2
+        s.t.   lo <= v <= hi   (the velocity box: position, velocity and acceleration limits)
+
+    over all tasks i, with W_i the task's weights (priorities play no part); poses in the task
+    frame; v in rad/s. With no bound active and one task it is damped least squares. With
+    `log_derivative` both sides of a pose task are multiplied by Jlog6. Keeps every limit; near a
+    limit or a singularity it leaves the course to do so.
+
+    Attributes:
+        damping: lambda, unsquared; not zero by default, else the minimiser is not unique on a
+            redundant arm.
+        braking: how the box approaches a position limit (see `dikbench.box`).
+        position_gain: share of the distance to a limit per step under `gain` braking.
+        log_derivative: whether to multiply tasks by the derivative of their logarithm.
+
+    Source: the lecture notes' QP (Tedrake, Robotic Manipulation, ch. 3); Caron's Pink for the
+    log-derivative.
+    """
+
+    damping: float = 1e-3
+    braking: Braking = "viable"
+    position_gain: float = 0.5
+    log_derivative: bool = False
+
+    program: ClassVar[Program] = "qp"
+    keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
+    source: ClassVar[str] = "Tedrake, Robotic Manipulation, ch. 3; Caron, Pink"
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        if not self.damping >= 0:
+            raise DikbenchError("qp: damping must be at least 0")
+        if not 0 < self.position_gain <= 1:
+            raise DikbenchError("qp: position_gain must be in (0, 1]")
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        n = problem.robot.nv
+        P = np.zeros((n, n))
+        P.flat[:: n + 1] = self.damping**2
+        q = np.zeros(n)
+        for task in problem.tasks:
+            J, V = task.J, task.V
+            Jl = task.log_derivative if self.log_derivative else None
+            if Jl is not None:
+                J, V = Jl @ J, Jl @ V
+            weighted = J.T * task.weight
+            P += weighted @ J
+            q -= weighted @ V
+        box = problem.box(self.braking, self.position_gain)
+        return solve(QuadraticProgram(P, q, lb=box.lower, ub=box.upper))

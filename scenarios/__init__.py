@@ -1,0 +1,24 @@
+"""The scenario families, one per file: parameters -> a Scenario that certifies its own difficulty.
+
+A new family is a file beside these and a line in this table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+from dikbench.scenario import Scenario
+from scenarios.joint_limit_crossing import joint_limit_crossing
+from scenarios.near_miss import near_miss
+from scenarios.reach import reach
+from scenarios.speed_sweep import speed_sweep
+
+SCENARIOS: Mapping[str, Callable[..., Scenario]] = MappingProxyType(
+    {
+        "reach": reach,
+        "near-miss": near_miss,
+        "joint-limit-crossing": joint_limit_crossing,
+        "speed-sweep": speed_sweep,
+    }
+)

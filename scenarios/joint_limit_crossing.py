@@ -1,0 +1,121 @@
+"""A path whose own joint motion crosses a position limit and comes back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import pi
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.array import Array
+from dikbench.certificate import Certificate, Claim
+from dikbench.errors import DikbenchError
+from dikbench.oracle import measure_motion
+from dikbench.references import joint_path
+from dikbench.robot_catalogue import load_robot
+from dikbench.scenario import Scenario
+from scenarios.common import between, limits_in_force, perturbed, positive, secondary_tasks
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Where a robot meets a limit.
+
+    Attributes:
+        posture: the other joints' posture [rad] (the crossing joint's own entry is not read).
+        joint: the joint that crosses its upper limit (index into v).
+    """
+
+    posture: tuple[float, ...]
+    joint: int
+
+
+CROSSINGS: Mapping[str, Crossing] = MappingProxyType(
+    {
+        "ur5": Crossing((0.0, -1.2, 1.4, -1.7, -1.4, 0.2), 0),
+        "panda": Crossing((0.0, -0.3, 0.0, -1.8, 0.0, 0.0, pi / 4), 5),
+    }
+)
+
+
+def joint_limit_crossing(
+    robot: Literal["ur5", "panda"] = "ur5",
+    *,
+    approach: float = 0.3,
+    depth: float = 0.2,
+    speed: float = 0.5,
+    gain: float = 5.0,
+    dt: float = 0.01,
+    acceleration: bool = False,
+    seed: int = 0,
+) -> Scenario:
+    """A path whose own joint motion crosses a position limit and comes back.
+
+    One joint j moves as q_j(t) = q_max,j - approach + (approach + depth) sin^2(pi t/T), the others
+    stand still, and the task frame is asked to follow: the target is out of reach, by this posture,
+    while q_j is beyond its limit. The UR5 crosses with its base, the Panda with its wrist (joint 6).
+    A seed moves the other joints by up to 0.1 rad.
+
+    Args:
+        robot: ur5 or panda.
+        approach: how far inside the limit the motion starts [rad].
+        depth: how far beyond the limit it goes [rad], 0.02 to 0.5.
+        speed: peak speed of the joint over its limit, 0.05 to 1.
+        gain: of the tracking task, 1/s.
+        dt: control period [s].
+        acceleration: whether acceleration limits are in force.
+        seed: 0 perturbs nothing.
+    """
+    positive("joint-limit-crossing", approach=approach, gain=gain, dt=dt)
+    between("joint-limit-crossing", "depth", depth, 0.02, 0.5)
+    between("joint-limit-crossing", "speed", speed, 0.05, 1.0)
+    arm = limits_in_force(load_robot(robot), acceleration=acceleration)
+    position, velocity = arm.limits.position, arm.limits.velocity
+    if position is None or velocity is None:
+        raise DikbenchError(f"scenario joint-limit-crossing: robot {robot} has no limits")
+    where = CROSSINGS[robot]
+    j = where.joint
+    start = perturbed(arm, np.array(where.posture), seed, 0.1, (j,))
+    start[j] = position.upper[j] - approach
+    amplitude = approach + depth
+    duration = pi * amplitude / (speed * velocity.upper[j])
+    out = np.zeros(arm.nv)
+    out[j] = 1.0
+
+    def q_r(tau: float) -> Array:
+        q: Array = pin.integrate(
+            arm.model, start, amplitude * np.sin(pi * tau / duration) ** 2 * out
+        )
+        return q
+
+    def v_r(tau: float) -> Array:
+        return amplitude * pi / duration * np.sin(2 * pi * tau / duration) * out
+
+    steps = max(2, round(duration / dt))
+    motion = measure_motion(arm, np.array([q_r(k * duration / steps) for k in range(steps + 1)]), dt)
+    certificate = Certificate(
+        (
+            Claim("position margin at the start [rad]", motion.margin[0], at_least=0.02),
+            Claim("deepest margin of the joint motion [rad]", motion.margin.min(), at_most=-0.02),
+            Claim("smallest singular value (m, rad)", motion.sigma_min.min(), at_least=0.03),
+            Claim("required speed over limit", motion.speed_ratio.max(), at_most=1.05),
+        )
+    )
+    return Scenario(
+        robot=arm,
+        q0=start,
+        v0=v_r(0.0),
+        reference=joint_path(arm, q_r, v_r, duration),
+        gain=gain,
+        dt=dt,
+        duration=duration,
+        certificate=certificate,
+        tasks=secondary_tasks(arm, start),
+    )
+
+
+joint_limit_crossing.source = "by construction; limits as in Flacco, De Luca & Khatib 2015"  # type: ignore[attr-defined]

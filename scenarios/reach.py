@@ -1,0 +1,93 @@
+"""A step to a target nearby, far from every limit and singularity."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.certificate import Certificate, Claim
+from dikbench.oracle import oracle_motion
+from dikbench.references import Reference, target_at_rest
+from dikbench.robot_catalogue import load_robot
+from dikbench.scenario import Scenario
+from scenarios.common import (
+    between,
+    limits_in_force,
+    perturbed,
+    placement_of,
+    positive,
+    secondary_tasks,
+    start_velocity,
+)
+
+
+def reach(
+    robot: str = "panda",
+    *,
+    frame: str | None = None,
+    distance: float = 0.1,
+    angle: float = 0.3,
+    gain: float = 2.0,
+    dt: float = 0.01,
+    duration: float = 2.5,
+    acceleration: bool = False,
+    seed: int = 0,
+) -> Scenario:
+    """A step to a target nearby: the easy case that every law must pass.
+
+    The target is `distance` [m] and `angle` [rad] away from the start, along the body axis
+    (-1, 1, -1)/sqrt(3) and about it (in the plane, for a planar arm). A seed turns the axis and
+    moves the start by up to 0.1 rad per joint.
+
+    Args:
+        robot: a robot's name, or the path of a URDF.
+        frame: its task frame; default: the robot's.
+        distance: of the target [m], 0.01 to 0.3.
+        angle: of the target [rad], 0 to 1.5.
+        gain: of the tracking task, 1/s.
+        dt: control period [s].
+        duration: [s].
+        acceleration: whether acceleration limits are in force.
+        seed: 0 perturbs nothing.
+    """
+    positive("reach", gain=gain, dt=dt, duration=duration)
+    between("reach", "distance", distance, 0.01, 0.3)
+    between("reach", "angle", angle, 0.0, 1.5)
+    arm = limits_in_force(load_robot(robot, frame), acceleration=acceleration)
+    q0 = perturbed(arm, arm.q0, seed, 0.1, fixed=())
+    start = placement_of(arm, q0)
+    axis = np.array([-1.0, 1.0, -1.0])
+    if seed:
+        axis = np.random.default_rng(seed).normal(size=3)
+    twist = np.concatenate([distance * axis, angle * axis]) / np.linalg.norm(axis)
+    twist[np.setdiff1d(np.arange(6), arm.task_rows)] = 0.0
+    target = start * pin.exp6(pin.Motion(twist))
+    # The motion that a gain asks for: straight there, at first by gain times the distance per second.
+    straight = Reference(
+        1 / gain,
+        lambda tau: start * pin.exp6(pin.Motion(gain * tau * twist)),
+        lambda tau: gain * twist,
+    )
+    motion = oracle_motion(arm, straight, q0, straight.duration / 50)
+    reference = target_at_rest(target, duration)
+    certificate = Certificate(
+        (
+            Claim("smallest singular value on the way", motion.sigma_min.min(), at_least=0.03),
+            Claim("position margin on the way [rad]", motion.margin.min(), at_least=0.05),
+            Claim("required speed over limit", motion.speed_ratio.max(), at_most=0.9),
+        )
+    )
+    return Scenario(
+        robot=arm,
+        q0=q0,
+        v0=start_velocity(arm, reference, q0),
+        reference=reference,
+        gain=gain,
+        dt=dt,
+        duration=duration,
+        certificate=certificate,
+        tasks=secondary_tasks(arm, q0),
+    )
+
+
+reach.source = "step response; every controller's first test"  # type: ignore[attr-defined]

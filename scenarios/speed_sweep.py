@@ -1,0 +1,88 @@
+"""A circle at a chosen share of what the joints can do."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from dikbench.certificate import Certificate, Claim
+from dikbench.oracle import oracle_motion
+from dikbench.references import circle
+from dikbench.robot_catalogue import load_robot
+from dikbench.scenario import Scenario
+from scenarios.common import (
+    between,
+    limits_in_force,
+    perturbed,
+    placement_of,
+    positive,
+    secondary_tasks,
+    start_velocity,
+)
+
+
+def speed_sweep(
+    robot: Literal["panda"] = "panda",
+    *,
+    path: Literal["circle"] = "circle",
+    speed: float = 0.7,
+    radius: float = 0.1,
+    laps: float = 2.0,
+    gain: float = 5.0,
+    dt: float = 0.01,
+    acceleration: bool = False,
+    seed: int = 0,
+) -> Scenario:
+    """A circle so fast that its own joint motion peaks at `speed` times the velocity limits.
+
+    In the world's y-z plane, upwards from the start, orientation fixed; the period follows from the
+    joint motion that tracks the first lap exactly. Above 1 no law can keep up. A seed moves the
+    start by up to 0.1 rad per joint.
+
+    Args:
+        robot: panda.
+        path: circle.
+        speed: rho, peak of the reference's joint motion over the limits, 0.1 to 3.
+        radius: [m], 0.02 to 0.15.
+        laps: number of laps.
+        gain: of the tracking task, 1/s.
+        dt: control period [s].
+        acceleration: whether acceleration limits are in force.
+        seed: 0 perturbs nothing.
+    """
+    positive("speed-sweep", laps=laps, gain=gain, dt=dt)
+    between("speed-sweep", "speed", speed, 0.1, 3.0)
+    between("speed-sweep", "radius", radius, 0.02, 0.15)
+    arm = limits_in_force(load_robot(robot), acceleration=acceleration)
+    q0 = perturbed(arm, arm.q0, seed, 0.1, fixed=())
+    start = placement_of(arm, q0)
+    # One lap in one second first: joint speeds scale with 1/period.
+    at_one_second = oracle_motion(arm, circle(start, radius, 1.0, 1.0), q0, 1 / 200)
+    period = float(at_one_second.speed_ratio.max()) / speed
+    reference = circle(start, radius, period, laps)
+    motion = oracle_motion(arm, circle(start, radius, period, 1.0), q0, period / 200)
+    certificate = Certificate(
+        (
+            Claim(
+                "required speed over limit",
+                motion.speed_ratio.max(),
+                at_least=0.98 * speed,
+                at_most=1.02 * speed,
+            ),
+            Claim("smallest singular value (m, rad)", motion.sigma_min.min(), at_least=0.05),
+            Claim("position margin [rad]", motion.margin.min(), at_least=0.05),
+        )
+    )
+    return Scenario(
+        robot=arm,
+        q0=q0,
+        v0=start_velocity(arm, reference, q0),
+        reference=reference,
+        gain=gain,
+        dt=dt,
+        duration=reference.duration,
+        certificate=certificate,
+        tasks=secondary_tasks(arm, q0),
+    )
+
+
+speed_sweep.source = "Flacco, De Luca & Khatib 2015 (trajectories scaled to the limits)"  # type: ignore[attr-defined]
