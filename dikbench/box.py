@@ -38,6 +38,9 @@ FAR: Final = 1e6
 CONFLICT: Final = 1e-9
 """A bound given up by less than this [rad/s] is rounding, not a relaxation."""
 
+WEAKEST: Final = 1e-9
+"""Deceleration [rad/s^2] below which a joint counts as having none (keeps k finite)."""
+
 
 class Box:
     """Bounds on the velocity of one control step.
@@ -111,8 +114,8 @@ def viable_brake(distance: Array, deceleration: Array, dt: float) -> Array:
     """
     braked = (distance < FAR) & np.isfinite(deceleration)
     d = np.where(braked, np.maximum(distance, 0.0), 0.0)
-    step = np.where(braked, deceleration, 1.0) * dt
-    k = np.floor(-0.5 + np.sqrt(0.25 + 2 * d / np.maximum(step * dt, np.finfo(float).tiny)))
+    step = np.where(braked, np.maximum(deceleration, WEAKEST), 1.0) * dt
+    k = np.floor(-0.5 + np.sqrt(0.25 + 2 * d / (step * dt)))
     speed = (d / dt + step * k * (k + 1) / 2) / (k + 1)
     return np.where(braked, speed, np.inf)
 
@@ -136,6 +139,9 @@ def _ask_for_the_way_back(limits: Limits, upper: Array, lower: Array, dt: float)
         up, down = way_back
         upper[above] = np.maximum(upper[above], -down[above])
         lower[below] = np.minimum(lower[below], up[below])
+    # In a narrow range the way back must not run through the limit on the other side.
+    upper[above] = np.maximum(upper[above], lower[above])
+    lower[below] = np.minimum(lower[below], upper[below])
 
 
 def _with_acceleration(lower: Array, upper: Array, slowest: Array, fastest: Array) -> Box:

@@ -28,8 +28,8 @@ class JointLimits:
 
     Attributes:
         nv: number of velocities.
-        q_index: index into q of each velocity's coordinate, shape (nv,); 0 where the joint has no
-            position limit (continuous joints, free-flyers).
+        q_index: index into q of each velocity's coordinate, shape (nv,); -1 where the joint can
+            have no position limit (continuous joints, free-flyers).
         position: bounds on that coordinate [rad or m], or None.
         velocity: bounds [rad/s or m/s], or None.
         acceleration: bounds [rad/s^2 or m/s^2], or None.
@@ -52,8 +52,9 @@ class JointLimits:
                 or a pair (lower, upper) of such.
 
         Raises:
-            DikbenchError: on a wrong shape, NaN, a lower bound above the upper one, or (but for
-                positions) an interval that does not contain zero.
+            DikbenchError: on a wrong shape, NaN, a lower bound above the upper one, (but for
+                positions) an interval that does not contain zero, or a finite position limit of
+                a joint that can have none.
         """
         if value is None:
             return replace(self, **{kind: None})
@@ -70,6 +71,12 @@ class JointLimits:
             raise DikbenchError(f"{kind} limit: a lower bound is above its upper bound")
         if kind != "position" and (np.any(lower > 0) or np.any(upper < 0)):
             raise DikbenchError(f"{kind} limit: every interval must contain zero (rest)")
+        limitless = (self.q_index < 0) & (np.isfinite(lower) | np.isfinite(upper))
+        if kind == "position" and limitless.any():
+            raise DikbenchError(
+                "position limit: continuous joints and free-flyers can have none; expected inf at "
+                f"{np.flatnonzero(limitless).tolist()}"
+            )
         return replace(self, **{kind: Interval(lower, upper)})
 
     def _vector(self, kind: str, value: object) -> Array:
@@ -84,7 +91,7 @@ class JointLimits:
                 f"{kind} limit: expected a number or {self.nv} numbers without NaN, "
                 f"got shape {vector.shape}"
             )
-        return np.where(np.abs(vector) > NO_LIMIT, np.sign(vector) * np.inf, vector)
+        return np.where(np.abs(vector) > NO_LIMIT, np.copysign(np.inf, vector), vector)
 
     @cached_property
     def way_back(self) -> tuple[Array, Array] | None:

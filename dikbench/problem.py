@@ -86,8 +86,9 @@ class Formulation(Protocol):
     """A law of differential inverse kinematics: a frozen dataclass whose fields are parameters.
 
     Besides `velocity` it may declare, as class attributes or properties, `program` (what it needs
-    a solver for; default: none), `keeps` (the limits it promises to keep; default: none) and
-    `source` (the paper). The same problem gives the same velocity.
+    a solver for; default: none) and `keeps` (the limits it promises to keep; default: none); a
+    paragraph `Source: ...` in its docstring names the paper. The same problem gives the same
+    velocity.
     """
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:

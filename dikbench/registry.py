@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib.metadata
 import importlib.util
 import inspect
+import os.path
 import sys
 import typing
 from collections.abc import Callable, Mapping
@@ -42,22 +43,27 @@ class Plugin:
     file: str
 
     @property
+    def documented(self) -> Any:  # noqa: ANN401
+        """The class or function that carries its docstring."""
+        return _target(self.build)
+
+    @property
     def summary(self) -> str:
         """The first line of its docstring."""
-        text = inspect.getdoc(_target(self.build)) or ""
-        return text.partition("\n")[0]
+        return (inspect.getdoc(self.documented) or "").partition("\n")[0]
 
     @property
     def source(self) -> str:
-        """The paper that it names as its source."""
-        return str(getattr(_target(self.build), "source", ""))
+        """The paragraph `Source: ...` of its docstring, on one line."""
+        _, _, text = (inspect.getdoc(self.documented) or "").partition("Source: ")
+        return " ".join(text.partition("\n\n")[0].split()).rstrip(".")
 
     @property
     def parameters(self) -> Mapping[str, inspect.Parameter]:
         """Its parameters, with their defaults."""
         return {
             name: parameter
-            for name, parameter in inspect.signature(_target(self.build)).parameters.items()
+            for name, parameter in inspect.signature(self.documented).parameters.items()
             if parameter.kind not in {parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD}
         }
 
@@ -222,7 +228,7 @@ def _reason(error: msgspec.ValidationError, wanted: Any) -> str:  # noqa: ANN401
 def _class_from_file(path: str, class_name: str) -> type:
     """Import a file that the user named on the command line and take a class out of it."""
     file = Path(path)
-    if not file.is_file():
+    if not os.path.isfile(path):  # unlike Path.is_file, False for a name that is too long
         raise DikbenchError(f"formulation file not found: {path}")
     spec = importlib.util.spec_from_file_location(f"dikbench_user_{file.stem}", file)
     assert spec is not None and spec.loader is not None

@@ -137,10 +137,11 @@ def model_limits(model: Any) -> JointLimits:  # noqa: ANN401
     A velocity or effort limit of zero means that the model does not say.
     """
     nv = model.nv
-    q_index = np.zeros(nv, dtype=int)
+    q_index = np.full(nv, -1)
     lower, upper = np.full(nv, -np.inf), np.full(nv, np.inf)
     for joint in model.joints:
-        if joint.nq == 1 and joint.nv == 1:
+        # The first one is the universe, which calls itself a revolute joint with index -1.
+        if joint.idx_v >= 0 and joint.nq == 1 and joint.nv == 1:
             q_index[joint.idx_v] = joint.idx_q
             lower[joint.idx_v] = model.lowerPositionLimit[joint.idx_q]
             upper[joint.idx_v] = model.upperPositionLimit[joint.idx_q]

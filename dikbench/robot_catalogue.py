@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+import os.path
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -143,7 +144,7 @@ def load_robot(name_or_urdf: str, frame: str | None = None, *, start: object = N
     text = str(name_or_urdf)
     if text in ROBOTS:
         robot = _load_named(text)
-    elif text.endswith((".urdf", ".xml")) or "/" in text or Path(text).is_file():
+    elif text.endswith((".urdf", ".xml")) or "/" in text or os.path.isfile(text):
         robot = _load_urdf(text, frame)
     else:
         raise unknown("robot", text, ROBOTS, "(or give the path of a .urdf file)")
@@ -172,7 +173,7 @@ def _load_named(name: str) -> Robot:
 
 
 def _load_urdf(path: str, frame: str | None) -> Robot:
-    if not Path(path).is_file():
+    if not os.path.isfile(path):  # unlike Path.is_file, False for a name that is too long
         raise DikbenchError(f"robot file not found: {path}")
     try:
         model = pin.buildModelFromUrdf(path)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
@@ -30,8 +29,6 @@ class DampedLeastSquares:
     """
 
     damping: float = 0.05
-
-    source: ClassVar[str] = "Wampler 1986; Nakamura & Hanafusa 1986"
 
     def __post_init__(self) -> None:
         """Check the parameters."""

@@ -39,7 +39,6 @@ class LpAlpha:
 
     program: ClassVar[Program] = "lp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
-    source: ClassVar[str] = "Tedrake, Robotic Manipulation, ch. 3"
 
     def __post_init__(self) -> None:
         """Check the parameters."""

@@ -37,7 +37,6 @@ class LpAlphaCvxpy:
 
     program: ClassVar[Program] = "cvxpy"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
-    source: ClassVar[str] = "Tedrake, Robotic Manipulation, ch. 3; Diamond & Boyd 2016"
 
     def __post_init__(self) -> None:
         """Check the parameters."""

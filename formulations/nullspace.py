@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
@@ -34,8 +33,6 @@ class Nullspace:
     """
 
     rank_tolerance: float = 1e-6
-
-    source: ClassVar[str] = "Nakamura et al. 1987; Siciliano & Slotine 1991"
 
     def __post_init__(self) -> None:
         """Check the parameters."""

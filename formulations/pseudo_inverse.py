@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -33,8 +33,6 @@ class PseudoInverse:
 
     after: Literal["none", "clip", "scale"] = "none"
     rank_tolerance: float = 1e-6
-
-    source: ClassVar[str] = "Whitney 1969"
 
     def __post_init__(self) -> None:
         """Check the parameters."""

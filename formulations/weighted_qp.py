@@ -44,7 +44,6 @@ class WeightedQp:
 
     program: ClassVar[Program] = "qp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
-    source: ClassVar[str] = "Tedrake, Robotic Manipulation, ch. 3; Caron, Pink"
 
     def __post_init__(self) -> None:
         """Check the parameters."""

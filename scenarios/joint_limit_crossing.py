@@ -69,6 +69,8 @@ def joint_limit_crossing(
         dt: control period [s].
         acceleration: whether acceleration limits are in force.
         seed: 0 perturbs nothing.
+
+    Source: by construction; limits as in Flacco, De Luca & Khatib 2015.
     """
     positive("joint-limit-crossing", approach=approach, gain=gain, dt=dt)
     between("joint-limit-crossing", "depth", depth, 0.02, 0.5)
@@ -116,6 +118,3 @@ def joint_limit_crossing(
         certificate=certificate,
         tasks=secondary_tasks(arm, start),
     )
-
-
-joint_limit_crossing.source = "by construction; limits as in Flacco, De Luca & Khatib 2015"  # type: ignore[attr-defined]

@@ -93,6 +93,8 @@ def near_miss(
         dt: control period [s].
         acceleration: whether acceleration limits are in force.
         seed: 0 perturbs nothing.
+
+    Source: Nakamura & Hanafusa 1986; Chiaverini, Siciliano & Egeland 1994.
     """
     positive("near-miss", speed=speed, gain=gain, dt=dt)
     if (robot, singularity) not in SINGULARITIES:
@@ -116,9 +118,6 @@ def near_miss(
         certificate=_certificate(where, miss, speed, motion),
         tasks=secondary_tasks(arm, q0),
     )
-
-
-near_miss.source = "Nakamura & Hanafusa 1986; Chiaverini, Siciliano & Egeland 1994"  # type: ignore[attr-defined]
 
 
 def _lost_twist(arm: Robot, q_s: Array) -> tuple[Any, Array, Array]:

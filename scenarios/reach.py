@@ -49,6 +49,8 @@ def reach(
         duration: [s].
         acceleration: whether acceleration limits are in force.
         seed: 0 perturbs nothing.
+
+    Source: step response; every controller's first test.
     """
     positive("reach", gain=gain, dt=dt, duration=duration)
     between("reach", "distance", distance, 0.01, 0.3)
@@ -88,6 +90,3 @@ def reach(
         certificate=certificate,
         tasks=secondary_tasks(arm, q0),
     )
-
-
-reach.source = "step response; every controller's first test"  # type: ignore[attr-defined]

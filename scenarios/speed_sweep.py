@@ -48,6 +48,8 @@ def speed_sweep(
         dt: control period [s].
         acceleration: whether acceleration limits are in force.
         seed: 0 perturbs nothing.
+
+    Source: Flacco, De Luca & Khatib 2015 (trajectories scaled to the limits).
     """
     positive("speed-sweep", laps=laps, gain=gain, dt=dt)
     between("speed-sweep", "speed", speed, 0.1, 3.0)
@@ -83,6 +85,3 @@ def speed_sweep(
         certificate=certificate,
         tasks=secondary_tasks(arm, q0),
     )
-
-
-speed_sweep.source = "Flacco, De Luca & Khatib 2015 (trajectories scaled to the limits)"  # type: ignore[attr-defined]

@@ -32,11 +32,16 @@ class ColdSolver:
 
     def __call__(self, program: QuadraticProgram) -> Answer:
         """Solve a program; a failure of any kind is an answer that claims nothing."""
+        G, h = program.G, program.h
+        if self._name == "highs" and G is None and program.A is None:
+            # HiGHS 1.15 calls wrong points optimal where bounds are all there is; a row that
+            # constrains nothing makes it right.
+            G, h = np.zeros((1, len(program.q))), np.ones(1)
         problem = qpsolvers.Problem(
             self._matrix(program.P),
             program.q,
-            self._matrix(program.G),
-            program.h,
+            self._matrix(G),
+            h,
             self._matrix(program.A),
             program.b,
             program.lb,

@@ -27,7 +27,9 @@ class ModelledSolver:
     __slots__ = ("_options",)
 
     def __init__(self, solver: Solver) -> None:
-        self._options: dict[str, Any] = {"solver": solver.name.upper(), **solver.settings}
+        # cvxpy would start from the answer before, which may be of another trial of this process.
+        options = {"solver": solver.name.upper(), "warm_start": False}
+        self._options: dict[str, Any] = {**options, **solver.settings}
 
     def __call__(self, program: QuadraticProgram | ModelledProgram) -> Answer:
         """Solve a program; a failure of any kind is an answer that claims nothing."""

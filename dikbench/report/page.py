@@ -1,0 +1,85 @@
+"""The report of a results folder: tables, figures, report.md."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import jinja2
+import pandas as pd
+
+from dikbench.report.figures import draw_figures
+from dikbench.report.tables import ALL, TABLES, make_table, markdown_rows, to_markdown
+from dikbench.run.results import ResultsFolder
+
+WORTH_SAYING = 0.01
+"""A share of steps above this is remarked upon."""
+
+
+def write_report(path: Path) -> list[tuple[str, str]]:
+    """Make tables, figures and report.md from trials.csv, the manifest and the traces.
+
+    Returns:
+        The tables as they are to be printed: (title, Markdown rows over all families).
+
+    Raises:
+        DikbenchError: if the folder holds no results.
+    """
+    folder = ResultsFolder(path)
+    trials, manifest = folder.read()
+    shown = []
+    (path / "tables").mkdir(exist_ok=True)
+    for name, kind in TABLES.items():
+        table = make_table(kind, trials)
+        table.to_csv(path / "tables" / f"{name}.csv", index=False)
+        (path / "tables" / f"{name}.md").write_text(to_markdown(kind, table))
+        rows = table[table["family"] == ALL].drop(columns="family")
+        shown.append({"name": name, "title": kind.title, "rows": markdown_rows(rows)})
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("dikbench.report", ""),
+        autoescape=False,  # Markdown, not HTML
+        undefined=jinja2.StrictUndefined,
+        keep_trailing_newline=True,
+    )
+    text = environment.get_template("report.md.j2").render(
+        study=manifest["study"],
+        manifest=manifest,
+        trials=len(trials),
+        failed=int((~trials["status"].isin(["ok", "skipped"])).sum()),
+        skipped=int(trials["status"].eq("skipped").sum()),
+        tables=shown,
+        figures=draw_figures(folder, trials, manifest),
+        remarks=remarks(trials),
+    )
+    (path / "report.md").write_text(text)
+    return [(table["title"], table["rows"]) for table in shown]
+
+
+def remarks(trials: pd.DataFrame) -> list[str]:
+    """What a reader must know before believing the tables, generated from the rows."""
+    found = [
+        "Times are cold calls, in one run on one machine: compare ratios.",
+        "The optimum of a law without a null-space term is not unique: solvers may differ in the "
+        "joint motion and agree in the task.",
+    ]
+    skipped = trials[trials["status"] == "skipped"]
+    for (formulation, solver, message), rows in skipped.groupby(
+        ["formulation", "solver", "message"], sort=False
+    ):
+        found.append(f"{formulation} with {solver}: {len(rows)} cells skipped: {message}.")
+    failed = trials[~trials["status"].isin(["ok", "skipped"])]
+    for (formulation, solver, status), rows in failed.groupby(
+        ["formulation", "solver", "status"], sort=False
+    ):
+        first = rows["message"].iloc[0]
+        found.append(f"{formulation} with {solver}: {len(rows)} trials {status}; first: {first}.")
+    for column, words in (
+        ("not_verified_share", "claimed success that the recheck denies"),
+        ("solver_failed_share", "gave no answer to a feasible program"),
+        ("relaxed_share", "had to give up an acceleration bound"),
+    ):
+        worst = trials.groupby(["formulation", "solver"], sort=False)[column].max()
+        for (formulation, solver), share in worst[worst > WORTH_SAYING].items():
+            found.append(
+                f"{formulation} with {solver} {words} in up to {100 * share:.0f} % of a run's steps."
+            )
+    return found

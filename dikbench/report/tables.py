@@ -1,0 +1,147 @@
+"""The three tables: tracking error, limit violation, timing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import pandas as pd
+
+from dikbench.selector import parse_selector
+
+LAW = ["formulation", "solver"]
+ALL = "all"
+"""Stands for all families, all plants."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table: a column of the trials, taken over them.
+
+    Attributes:
+        of: column of trials.csv.
+        how: `median`, `max` or `min` over the trials of the row.
+        heading: what stands above it.
+    """
+
+    of: str
+    how: str
+    heading: str
+
+
+@dataclass(frozen=True)
+class TableKind:
+    """One of the tables.
+
+    Attributes:
+        title: one line above it.
+        columns: what it shows.
+    """
+
+    title: str
+    columns: Sequence[Column]
+
+
+TABLES: Mapping[str, TableKind] = MappingProxyType(
+    {
+        "tracking_error": TableKind(
+            "Tracking error: median over scenarios, and the worst of them",
+            (
+                Column("position_error_rms_m", "median", "position rms median [m]"),
+                Column("position_error_max_m", "max", "position worst [m]"),
+                Column("orientation_error_rms_rad", "median", "orientation rms median [rad]"),
+                Column("off_course_max_rad", "median", "off course median [rad]"),
+                Column("off_course_max_rad", "max", "off course worst [rad]"),
+                Column("progress_mean", "median", "progress median"),
+                Column("progress_min", "min", "progress worst"),
+                Column("stuck_share", "max", "stuck worst share"),
+            ),
+        ),
+        "limit_violation": TableKind(
+            "Limit violation: the worst over scenarios",
+            (
+                Column("velocity_peak_ratio", "max", "peak speed over limit"),
+                Column("position_violation_max_rad", "max", "position [rad]"),
+                Column("velocity_violation_max_rad_s", "max", "velocity [rad/s]"),
+                Column("acceleration_violation_max_rad_s2", "max", "acceleration [rad/s^2]"),
+                Column("violating_share", "max", "violating share"),
+                Column("infeasible_share", "max", "infeasible share"),
+                Column("solver_failed_share", "max", "solver failed share"),
+                Column("not_verified_share", "max", "not verified share"),
+            ),
+        ),
+        "timing": TableKind(
+            "Timing of one call of the law: median over scenarios",
+            (
+                Column("law_time_median_us", "median", "median [us]"),
+                Column("law_time_p99_us", "median", "p99 [us]"),
+                Column("solve_time_median_us", "median", "of it solving [us]"),
+            ),
+        ),
+    }
+)
+
+
+def family(scenario: str) -> str:
+    """The family of a scenario's selector."""
+    return parse_selector(scenario).name
+
+
+def make_table(kind: TableKind, trials: pd.DataFrame) -> pd.DataFrame:
+    """A table, overall and per family, per plant where the plant matters.
+
+    Rows that were skipped, or failed, count in `trials` and `failed` and carry no numbers.
+
+    Args:
+        kind: which table.
+        trials: the rows of trials.csv.
+
+    Returns:
+        Columns family, plant, formulation, solver, trials, failed, and the table's own.
+    """
+    timing = kind is TABLES["timing"]
+    frame = trials[trials["status"] != "skipped"].assign(family=trials["scenario"].map(family))
+    if timing:
+        # Times belong to a law, a solver and a scenario; they stand on the row of each plant.
+        frame = frame.drop_duplicates([*LAW, "scenario"]).assign(plant=ALL)
+        frame = frame[frame["law_time_median_us"].notna()]
+    whole = frame.assign(family=ALL)
+    parts = []
+    for part in (whole, frame):
+        groups = part.groupby(["family", "plant", *LAW], sort=False, dropna=False)
+        columns = {
+            "trials": groups.size(),
+            "failed": groups["status"].agg(lambda s: int((s != "ok").sum())),
+        }
+        for column in kind.columns:
+            columns[column.heading] = groups[column.of].agg(column.how)
+        parts.append(pd.DataFrame(columns).reset_index())
+    table = pd.concat(parts, ignore_index=True)
+    return table.drop(columns=["plant", "trials", "failed"]) if timing else table
+
+
+def to_markdown(kind: TableKind, table: pd.DataFrame) -> str:
+    """The table as Markdown, a section per family, four significant digits, nothing where nothing is."""
+    lines = [f"# {kind.title}", ""]
+    for name, part in table.groupby("family", sort=False):
+        shown = part.drop(columns="family")
+        lines += [f"## {'All families' if name == ALL else name}", "", markdown_rows(shown), ""]
+    return "\n".join(lines)
+
+
+def markdown_rows(table: pd.DataFrame) -> str:
+    """A data frame as a Markdown table."""
+    head = "| " + " | ".join(map(str, table.columns)) + " |"
+    rule = "|" + "|".join("---:" if kind.kind in "if" else "---" for kind in table.dtypes) + "|"
+    rows = [
+        "| " + " | ".join(_cell(value) for value in row) + " |"
+        for row in table.itertuples(index=False, name=None)
+    ]
+    return "\n".join([head, rule, *rows])
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, float):
+        return "" if value != value else f"{value:.4g}"  # NaN is unequal to itself
+    return str(value).replace("|", "\\|")

@@ -1,0 +1,56 @@
+"""Progress of long work: a bar on a terminal, a line now and then elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import time
+from types import TracebackType
+from typing import Final, Self
+
+from tqdm import tqdm
+
+QUIET_SECONDS: Final = 5.0
+"""Off a terminal, at most one line in this time."""
+
+
+class ProgressDisplay:
+    """Counts finished pieces of work; shows rate and time left."""
+
+    def __init__(self, total: int, what: str) -> None:
+        self._total = total
+        self._what = what
+        self._done = 0
+        self._start = self._last = time.monotonic()
+        self._bar = (
+            tqdm(total=total, desc=what, unit=f" {what}", file=sys.stderr)
+            if sys.stderr.isatty()
+            else None
+        )
+
+    def __enter__(self) -> Self:
+        """Start."""
+        return self
+
+    def advance(self) -> None:
+        """One more is finished."""
+        self._done += 1
+        if self._bar is not None:
+            self._bar.update()
+            return
+        now = time.monotonic()
+        if now - self._last >= QUIET_SECONDS or self._done == self._total:
+            self._last = now
+            rate = self._done / max(now - self._start, 1e-9)
+            left = (self._total - self._done) / rate
+            line = f"{self._what}: {self._done}/{self._total}, {rate:.1f}/s, {left:.0f} s left"
+            print(line, file=sys.stderr, flush=True)
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """End."""
+        if self._bar is not None:
+            self._bar.close()

@@ -1,0 +1,218 @@
+"""Studies: which cells to run. One TOML file; it only selects and sets parameters."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+
+from dikbench.errors import DikbenchError, unknown
+from dikbench.problem import program_of
+from dikbench.registry import make_formulation, make_scenario
+from dikbench.selector import parse_selector
+from dikbench.solvers.catalogue import DEFAULT_SOLVER, parse_solver, why_not
+from dikbench.trial import NO_SOLVER, Trial
+
+DEFAULT_STUDY = "quick"
+
+NOT_EMPTY = msgspec.Meta(min_length=1)
+Names = Annotated[tuple[str, ...], NOT_EMPTY]
+
+
+class Cells(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """Formulations and the solvers with which each is run (none for laws that need none)."""
+
+    formulations: Names
+    solvers: tuple[str, ...] = ()
+
+
+class TimingSettings(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """The timing pass.
+
+    Attributes:
+        reference: the law whose run supplies the problems of each scenario.
+        problems: how many of them, contiguous, from the middle of the run.
+        rounds: how often they are replayed.
+        scenarios: which of the study's scenarios are timed; empty: all.
+    """
+
+    reference: str
+    problems: Annotated[int, msgspec.Meta(ge=1)] = 100
+    rounds: Annotated[int, msgspec.Meta(ge=1)] = 5
+    scenarios: tuple[str, ...] = ()
+
+
+class Study(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """A selection of cells.
+
+    Attributes:
+        description: one line.
+        cells: formulations with their solvers.
+        scenarios: selectors of scenarios.
+        plants, references, seeds: see `Trial`.
+        example: the scenario whose runs are drawn against time; default: the first one.
+        timing: the timing pass; None: no times are taken.
+        name: the study's name (from the file's).
+    """
+
+    description: str
+    cells: Annotated[tuple[Cells, ...], NOT_EMPTY]
+    scenarios: Names
+    plants: Annotated[tuple[Literal["ideal", "saturating"], ...], NOT_EMPTY] = (
+        "ideal",
+        "saturating",
+    )
+    references: Annotated[tuple[Literal["time", "path"], ...], NOT_EMPTY] = ("time",)
+    seeds: Annotated[tuple[Annotated[int, msgspec.Meta(ge=0)], ...], NOT_EMPTY] = (0,)
+    example: str = ""
+    timing: TimingSettings | None = None
+    name: str = ""
+
+
+class PlannedTrial(msgspec.Struct, frozen=True):
+    """A trial, and why it cannot run, if it cannot."""
+
+    trial: Trial
+    skip: str = ""
+
+
+def shipped_studies() -> dict[str, Path]:
+    """The studies that come with dikbench, by name."""
+    folder = Path(str(resources.files("dikbench") / "studies"))
+    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def load_study(name_or_file: str) -> Study:
+    """Read a shipped study or a TOML file.
+
+    Raises:
+        DikbenchError: if there is no such study or file, or it is not a study.
+    """
+    shipped = shipped_studies()
+    if name_or_file in shipped:
+        path = shipped[name_or_file]
+    elif name_or_file.endswith(".toml") or Path(name_or_file).is_file():
+        path = Path(name_or_file)
+    else:
+        raise unknown("study", name_or_file, shipped, "(or give the path of a .toml file)")
+    try:
+        study = msgspec.toml.decode(path.read_bytes(), type=Study)
+    except OSError as error:
+        raise DikbenchError(f"study {path}: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise DikbenchError(f"study {path}: not a text file in UTF-8") from None
+    except msgspec.ValidationError as error:
+        raise DikbenchError(f"study {path}: {_explained(str(error))}") from None
+    except msgspec.DecodeError as error:
+        raise DikbenchError(f"study {path}: not valid TOML: {error}") from None
+    return msgspec.structs.replace(study, name=study.name or path.stem)
+
+
+def _explained(reason: str) -> str:
+    """An error of msgspec, with the valid keys where the key was wrong."""
+    if "unknown field" not in reason:
+        return reason
+    place = Cells if "$.cells" in reason else TimingSettings if "$.timing" in reason else Study
+    valid = ", ".join(field.name for field in msgspec.structs.fields(place))
+    return f"{reason}; valid keys: {valid}"
+
+
+def select(
+    base: Study,
+    *,
+    named: bool,
+    formulations: Sequence[str] = (),
+    scenarios: Sequence[str] = (),
+    solvers: Sequence[str] = (),
+    seeds: Sequence[int] = (),
+    plants: Sequence[str] = (),
+    references: Sequence[str] = (),
+) -> Study:
+    """A study with some of its axes replaced.
+
+    A formulation that is given without a solver keeps the solvers that a named study has for it;
+    otherwise it runs with the default solver.
+
+    Args:
+        base: the study to start from.
+        named: whether the user named it.
+        formulations, scenarios, solvers, seeds, plants, references: what replaces an axis; empty:
+            the study's own.
+    """
+    cells = base.cells
+    if formulations:
+        cells = tuple(_cells_for(base, text, named) for text in formulations)
+    if solvers:
+        cells = tuple(msgspec.structs.replace(cell, solvers=tuple(solvers)) for cell in cells)
+    example = base.example if base.example in (scenarios or base.scenarios) else ""
+    changed = msgspec.structs.replace(
+        base,
+        cells=cells,
+        scenarios=tuple(scenarios) or base.scenarios,
+        seeds=tuple(seeds) or base.seeds,
+        plants=tuple(plants) or base.plants,
+        references=tuple(references) or base.references,
+        example=example,
+    )
+    if changed != base and not named:
+        changed = msgspec.structs.replace(changed, name="selection", description="from the command line")
+    return changed
+
+
+def _cells_for(base: Study, text: str, named: bool) -> Cells:
+    program = program_of(make_formulation(text))
+    if program is None:
+        return Cells((text,))
+    if named:
+        for cell in base.cells:
+            if parse_selector(text).name in {parse_selector(f).name for f in cell.formulations}:
+                return Cells((text,), cell.solvers)
+    return Cells((text,), (DEFAULT_SOLVER[program],))
+
+
+def expand(study: Study) -> list[PlannedTrial]:
+    """Every trial of a study, in a fixed order, each once.
+
+    Names, parameters and solvers are checked, and each scenario is built once with the first seed,
+    so that a mistake shows before anything runs. A pair of law and solver that cannot work is kept,
+    with the reason.
+
+    Raises:
+        DikbenchError: on the first selector that does not name anything valid.
+    """
+    for scenario in study.scenarios:
+        make_scenario(scenario, study.seeds[0])
+    if study.timing is not None and program_of(make_formulation(study.timing.reference)):
+        raise DikbenchError(
+            f"study {study.name}: timing.reference {study.timing.reference!r} needs a solver; "
+            "name a law that needs none"
+        )
+    planned: dict[Trial, PlannedTrial] = {}
+    for cells in study.cells:
+        for formulation in cells.formulations:
+            for solver, skip in _solvers_for(study, formulation, cells.solvers):
+                for scenario, plant, reference, seed in itertools.product(
+                    study.scenarios, study.plants, study.references, study.seeds
+                ):
+                    trial = Trial(formulation, scenario, solver, plant, reference, seed)
+                    planned.setdefault(trial, PlannedTrial(trial, skip))
+    return list(planned.values())
+
+
+def _solvers_for(
+    study: Study, formulation: str, solvers: Sequence[str]
+) -> list[tuple[str, str]]:
+    """The solvers with which a law runs, each with the reason if the pair cannot work."""
+    program = program_of(make_formulation(formulation))
+    parsed = [(text, parse_solver(text)) for text in solvers]
+    if program is None:
+        return [(NO_SOLVER, "")]
+    if not parsed:
+        raise DikbenchError(
+            f"study {study.name}: formulation {formulation!r} needs a solver and its cells name none"
+        )
+    return [(text, why_not(solver, program)) for text, solver in parsed]
