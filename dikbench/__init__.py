@@ -61,7 +61,7 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:  # noqa: ANN401
+def __getattr__(name: str) -> Any:
     """Import a public name on first use, so that `dikbench --help` does not wait for Pinocchio."""
     if name not in _HOME:
         raise AttributeError(f"module 'dikbench' has no attribute {name!r}")

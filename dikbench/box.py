@@ -15,8 +15,8 @@ limit at distance d, with a the deceleration that is in force:
 With no acceleration limit in force `sqrt` and `viable` are `one-step`.
 
 Where the bounds contradict each other position wins over velocity, velocity over acceleration, and
-every joint whose acceleration bound was given up is counted. Outside a position limit the bound asks
-for the way back: hi = max(d/dt, -v_back) with v_back a tenth of the velocity limit.
+every joint whose acceleration bound was given up is counted. Outside a position limit the bound
+asks for the way back: hi = max(d/dt, -v_back) with v_back a tenth of the velocity limit.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ Braking = Literal["one-step", "gain", "sqrt", "viable"]
 BRAKINGS: Final = get_args(Braking)
 
 FAR: Final = 1e6
-"""Distance [rad] from which a position limit brakes nothing (keeps infinity out of the formulas)."""
+"""Distance [rad] from which a position limit brakes nothing: infinity stays out of the formulas."""
 
 CONFLICT: Final = 1e-9
 """A bound given up by less than this [rad/s] is rounding, not a relaxation."""
@@ -130,7 +130,8 @@ def sqrt_brake(distance: Array, deceleration: Array, dt: float) -> Array:
 
 def _ask_for_the_way_back(limits: Limits, upper: Array, lower: Array, dt: float) -> None:
     """Overwrite, in place, the bounds of the joints that are outside a position limit."""
-    assert limits.to_lower is not None and limits.to_upper is not None
+    assert limits.to_lower is not None
+    assert limits.to_upper is not None
     above, below = limits.to_upper < 0, limits.to_lower < 0
     upper[above] = limits.to_upper[above] / dt
     lower[below] = -limits.to_lower[below] / dt

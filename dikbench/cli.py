@@ -42,22 +42,61 @@ def main() -> None:
 
 @main.command()
 @click.argument("study", required=False)
-@click.option("--formulation", "formulations", multiple=True, metavar="SELECTOR",
-              help="A law, or path/to/file.py:Class; repeat for more.")
-@click.option("--scenario", "scenarios", multiple=True, metavar="SELECTOR",
-              help="A scenario; repeat for more.")
-@click.option("--solver", "solvers", multiple=True, metavar="SELECTOR",
-              help="A solver, for laws that need one; repeat for more.")
-@click.option("--seed", "seeds", multiple=True, type=click.IntRange(min=0), metavar="N",
-              help="A seed of the scenarios; 0 perturbs nothing; repeat for more.")
-@click.option("--plant", "plants", multiple=True, type=click.Choice(["ideal", "saturating"]),
-              help="What becomes of a command; repeat for both.")
-@click.option("--reference", "references", multiple=True, type=click.Choice(["time", "path"]),
-              help="What moves the reference on: the clock, or the progress achieved.")
-@click.option("--jobs", type=click.IntRange(min=1), metavar="N",
-              help="Worker processes; default: one per core.")
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), metavar="DIR",
-              help="Results folder; default: runs/STUDY.")
+@click.option(
+    "--formulation",
+    "formulations",
+    multiple=True,
+    metavar="SELECTOR",
+    help="A law, or path/to/file.py:Class; repeat for more.",
+)
+@click.option(
+    "--scenario",
+    "scenarios",
+    multiple=True,
+    metavar="SELECTOR",
+    help="A scenario; repeat for more.",
+)
+@click.option(
+    "--solver",
+    "solvers",
+    multiple=True,
+    metavar="SELECTOR",
+    help="A solver, for laws that need one; repeat for more.",
+)
+@click.option(
+    "--seed",
+    "seeds",
+    multiple=True,
+    type=click.IntRange(min=0),
+    metavar="N",
+    help="A seed of the scenarios; 0 perturbs nothing; repeat for more.",
+)
+@click.option(
+    "--plant",
+    "plants",
+    multiple=True,
+    type=click.Choice(["ideal", "saturating"]),
+    help="What becomes of a command; repeat for both.",
+)
+@click.option(
+    "--reference",
+    "references",
+    multiple=True,
+    type=click.Choice(["time", "path"]),
+    help="What moves the reference on: the clock, or the progress achieved.",
+)
+@click.option(
+    "--jobs",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Worker processes; default: one per core.",
+)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="DIR",
+    help="Results folder; default: runs/STUDY.",
+)
 @one_line_errors
 def run(
     study: str | None,
@@ -75,21 +114,13 @@ def run(
     STUDY is a shipped study (see `dikbench list studies`) or a TOML file; default: quick. Each
     option replaces an axis of the study.
     """
-    from dikbench.report.page import write_report  # noqa: PLC0415
-    from dikbench.run.runner import run_study  # noqa: PLC0415
-    from dikbench.run.workers import available_cores  # noqa: PLC0415
-    from dikbench.study import DEFAULT_STUDY, load_study, select  # noqa: PLC0415
+    from dikbench.report.page import write_report
+    from dikbench.run.runner import run_study
+    from dikbench.run.workers import available_cores
+    from dikbench.study import DEFAULT_STUDY, Selection, load_study, select
 
-    selected = select(
-        load_study(study or DEFAULT_STUDY),
-        named=study is not None,
-        formulations=formulations,
-        scenarios=scenarios,
-        solvers=solvers,
-        seeds=seeds,
-        plants=plants,
-        references=references,
-    )
+    selection = Selection(formulations, scenarios, solvers, seeds, plants, references)
+    selected = select(load_study(study or DEFAULT_STUDY), selection, named=study is not None)
     folder = out or Path("runs") / selected.name
     command = shlex.join(["dikbench", *sys.argv[1:]])
     run_study(selected, folder, jobs or available_cores(), command)
@@ -103,7 +134,7 @@ def run(
 @one_line_errors
 def list_(subject: str | None) -> None:
     """List what there is, a line each with its source; all of it without SUBJECT."""
-    from dikbench.listing import listing  # noqa: PLC0415
+    from dikbench.listing import listing
 
     for name in (subject,) if subject else SUBJECTS:
         if subject is None:
@@ -120,8 +151,6 @@ def show(name: str) -> None:
 
     A scenario's selector prints its certificate as well.
     """
-    from dikbench.listing import description  # noqa: PLC0415
+    from dikbench.listing import description
 
     click.echo(description(name))
-
-

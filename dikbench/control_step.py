@@ -56,9 +56,7 @@ def control_step(formulation: Formulation, problem: DikProblem, solve: CheckedSo
         return Outcome(fallback(problem), status, law_ns)
     except Exception as error:
         message = str(error).strip().partition("\n")[0]
-        raise TrialEnded(
-            Status.FORMULATION_ERROR, f"{type(error).__name__}: {message}"
-        ) from error
+        raise TrialEnded(Status.FORMULATION_ERROR, f"{type(error).__name__}: {message}") from error
     law_ns = perf_counter_ns() - start - solve.checking_ns
     if not isinstance(v, np.ndarray) or v.shape != (problem.robot.nv,):
         shape = getattr(v, "shape", type(v).__name__)

@@ -32,7 +32,7 @@ class Kinematics:
         self.q = q
         pin.computeJointJacobians(self._model, self._data, q)
 
-    def placement(self, frame: int) -> Any:  # noqa: ANN401 (a Pinocchio SE3: no stubs)
+    def placement(self, frame: int) -> Any:
         """Placement of a frame in the world, as a view into the data: copy it to keep it."""
         return pin.updateFramePlacement(self._model, self._data, frame)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -57,7 +58,7 @@ class JointLimits:
                 a joint that can have none.
         """
         if value is None:
-            return replace(self, **{kind: None})
+            return self._replaced(kind, None)
         if isinstance(value, tuple):
             if len(value) != 2:
                 raise DikbenchError(
@@ -77,7 +78,11 @@ class JointLimits:
                 "position limit: continuous joints and free-flyers can have none; expected inf at "
                 f"{np.flatnonzero(limitless).tolist()}"
             )
-        return replace(self, **{kind: Interval(lower, upper)})
+        return self._replaced(kind, Interval(lower, upper))
+
+    def _replaced(self, kind: str, interval: Interval | None) -> JointLimits:
+        changed: dict[str, Any] = {kind: interval}
+        return replace(self, **changed)
 
     def _vector(self, kind: str, value: object) -> Array:
         try:

@@ -22,6 +22,6 @@ def pseudo_inverse(A: Array, tolerance: float) -> Array:
 
 
 def solve_positive_definite(A: Array, b: Array) -> Array | None:
-    """x with A x = b for a symmetric positive definite A (n, n); None where A is not."""
+    """X with A x = b for a symmetric positive definite A (n, n); None where A is not."""
     _, x, info = dposv(A, b)
     return x if info == 0 else None

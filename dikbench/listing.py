@@ -43,8 +43,10 @@ def _solvers() -> list[tuple[str, str, str]]:
 
 
 def _metrics() -> list[tuple[str, str, str]]:
-    return [(m.name, m.definition, "lower is better" if m.best == "low" else "higher is better")
-        for m in METRICS.values()]
+    return [
+        (m.name, m.definition, "lower is better" if m.best == "low" else "higher is better")
+        for m in METRICS.values()
+    ]
 
 
 _SUBJECTS: Mapping[str, Callable[[], list[tuple[str, str, str]]]] = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from types import MappingProxyType
 from typing import Final, Literal
 
@@ -117,7 +118,7 @@ def _violating_share(motion: Motion) -> float:
 
 def _travel(motion: Motion) -> float:
     model, q = motion.scenario.robot.model, motion.trace.q
-    steps = [np.abs(pin.difference(model, a, b)).sum() for a, b in zip(q[:-1], q[1:], strict=True)]
+    steps = [np.abs(pin.difference(model, a, b)).sum() for a, b in pairwise(q)]
     return float(np.sum(steps))
 
 

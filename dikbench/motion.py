@@ -54,5 +54,5 @@ def recompute(trace: Trace, scenario: Scenario) -> Motion:
         position_error=position,
         orientation_error=orientation,
         achieved=np.einsum("kij,kj->ki", J[:n], trace.applied),
-        sigma_min=np.linalg.svd(J, compute_uv=False)[:, -1],
+        sigma_min=np.asarray(np.linalg.svd(J, compute_uv=False)[:, -1], dtype=float),
     )

@@ -51,7 +51,7 @@ def solve_dik(
     *,
     formulation: str | Formulation,
     twist: object = None,
-    target: Any = None,  # noqa: ANN401 (a Pinocchio SE3: no stubs)
+    target: Any = None,
     reference_frame: ReferenceFrame = "LOCAL",
     gain: float | None = None,
     dt: float = 0.01,
@@ -117,7 +117,7 @@ def solve_dik(
     return DikAnswer(v, alpha, status, problem.relaxed)
 
 
-def _solve_for(law: Formulation, selector: str | None) -> Any:  # noqa: ANN401
+def _solve_for(law: Formulation, selector: str | None) -> Any:
     program = program_of(law)
     if program is None:
         if selector is not None:
@@ -145,7 +145,7 @@ def _twist_task(kinematics: Kinematics, twist: object, reference_frame: str) -> 
     return LinearizedTask(kinematics.jacobian(robot.frame_id)[rows], V[rows], np.zeros(len(rows)))
 
 
-def _target_task(kinematics: Kinematics, target: Any, gain: float) -> LinearizedTask:  # noqa: ANN401
+def _target_task(kinematics: Kinematics, target: Any, gain: float) -> LinearizedTask:
     if not isinstance(target, pin.SE3):
         raise DikbenchError(f"target: expected a pinocchio.SE3, got {type(target).__name__}")
     if not np.isfinite(target.homogeneous).all():

@@ -1,8 +1,9 @@
-"""The joint motion that follows a reference exactly, limits or not: what scenarios are measured on."""
+"""The joint motion that follows a reference exactly, limits or not: the measure of scenarios."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from dikbench.references import Reference
 from dikbench.robot import Robot
 
 
-def solve_placement(robot: Robot, target: Any, seed: Array, *, iterations: int = 200) -> Array:  # noqa: ANN401
+def solve_placement(robot: Robot, target: Any, seed: Array, *, iterations: int = 200) -> Array:
     """A configuration whose task frame is at `target`, by damped Gauss-Newton from `seed`.
 
     Steps are Levenberg-Marquardt with damping by the squared error (Sugihara 2011), at most 0.3 rad
@@ -95,7 +96,7 @@ def oracle_motion(
 def measure_motion(robot: Robot, q: Array, dt: float) -> OracleMotion:
     """Measure a joint motion (k + 1, nq) that is sampled every dt [s]."""
     model, rows = robot.model, np.array(robot.task_rows)
-    v = np.array([pin.difference(model, a, b) / dt for a, b in zip(q[:-1], q[1:], strict=True)])
+    v = np.array([pin.difference(model, a, b) / dt for a, b in pairwise(q)])
     kinematics = Kinematics(robot)
     sigma, margin = [], []
     for sample in q:

@@ -10,7 +10,7 @@ import pinocchio as pin
 
 def planar_arm(
     lengths: tuple[float, ...], *, velocity_limit: float, position_limit: float = 2.8
-) -> Any:  # noqa: ANN401 (a Pinocchio model: no stubs)
+) -> Any:
     """Build a chain of revolute joints about z, with links along x.
 
     Args:

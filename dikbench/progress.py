@@ -24,7 +24,7 @@ def row_weights(rows: tuple[int, ...], length: float = CHARACTERISTIC_LENGTH) ->
 
 
 def progress(wanted: Array, achieved: Array, weights: Array) -> Array:
-    """alpha = <V_a, V>_M / |V|_M^2 per step, (n,); NaN in a dwell; negative means reversal.
+    """Alpha = <V_a, V>_M / |V|_M^2 per step, (n,); NaN in a dwell; negative means reversal.
 
     Args:
         wanted: V, (n, m) [m/s; rad/s].

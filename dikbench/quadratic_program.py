@@ -12,7 +12,7 @@ one written in cvxpy's modelling words."""
 
 
 class QuadraticProgram:
-    """The program in x
+    """The program in x.
 
         min 1/2 x^T P x + q^T x   s.t.   G x <= h,   A x = b,   lb <= x <= ub
 

@@ -33,19 +33,19 @@ class Reference:
     moving: bool = True
 
 
-def target_at_rest(target: Any, duration: float) -> Reference:  # noqa: ANN401
+def target_at_rest(target: Any, duration: float) -> Reference:
     """A placement that is wanted from the first instant on (a step)."""
     zero = np.zeros(6)
     return Reference(duration, lambda tau: target, lambda tau: zero, moving=False)
 
 
-def screw_path(middle: Any, twist: Array, duration: float) -> Reference:  # noqa: ANN401
+def screw_path(middle: Any, twist: Array, duration: float) -> Reference:
     """A constant body twist (6,) through `middle`, which it passes at half the duration.
 
     X_d(tau) = middle exp6((tau - duration/2) twist).
     """
 
-    def placement(tau: float) -> Any:  # noqa: ANN401
+    def placement(tau: float) -> Any:
         return middle * pin.exp6(pin.Motion((tau - duration / 2) * twist))
 
     return Reference(duration, placement, lambda tau: twist)
@@ -61,7 +61,7 @@ def joint_path(
     model, frame = robot.model, robot.frame_id
     data = model.createData()
 
-    def placement(tau: float) -> Any:  # noqa: ANN401
+    def placement(tau: float) -> Any:
         pin.forwardKinematics(model, data, configuration(tau))
         return pin.updateFramePlacement(model, data, frame).copy()
 
@@ -73,7 +73,7 @@ def joint_path(
     return Reference(duration, placement, twist)
 
 
-def circle(start: Any, radius: float, period: float, laps: float) -> Reference:  # noqa: ANN401
+def circle(start: Any, radius: float, period: float, laps: float) -> Reference:
     """A circle in the world's y-z plane through `start`, orientation fixed.
 
     Args:
@@ -86,7 +86,7 @@ def circle(start: Any, radius: float, period: float, laps: float) -> Reference: 
     centre = start.translation + np.array([0.0, 0.0, radius])
     rate = 2 * np.pi / period
 
-    def placement(tau: float) -> Any:  # noqa: ANN401
+    def placement(tau: float) -> Any:
         offset = np.array([0.0, np.sin(rate * tau), -np.cos(rate * tau)])
         return pin.SE3(rotation, centre + radius * offset)
 

@@ -43,7 +43,7 @@ class Plugin:
     file: str
 
     @property
-    def documented(self) -> Any:  # noqa: ANN401
+    def documented(self) -> Any:
         """The class or function that carries its docstring."""
         return _target(self.build)
 
@@ -84,8 +84,8 @@ def plugins(kind: Kind) -> Mapping[str, Plugin]:
             module = entry_point.load()
         except Exception as error:
             raise DikbenchError(
-                f"plug-in {entry_point.name!r} of {group} ({entry_point.value}) cannot be imported: "
-                f"{type(error).__name__}: {error}"
+                f"plug-in {entry_point.name!r} of {group} ({entry_point.value}) cannot be imported:"
+                f" {type(error).__name__}: {error}"
             ) from error
         file = getattr(module, "__file__", None) or repr(module)
         table = getattr(module, table_name, None)
@@ -111,7 +111,7 @@ def plugins(kind: Kind) -> Mapping[str, Plugin]:
 def _checked(kind: Kind, name: object, build: object, file: str) -> Plugin:
     if not isinstance(name, str) or set(name) & set("[],= \t\n"):
         raise DikbenchError(f"{file}: {name!r} is not a name (no brackets, commas or spaces)")
-    if kind == "formulation" and not isinstance(build, type) and is_dataclass(build):
+    if kind == "formulation" and is_dataclass(build) and not isinstance(build, type):
         build = partial(replace, build)  # a law with its parameters set: they are the defaults
     if not callable(build):
         raise DikbenchError(f"{file}: {kind} {name!r} is not callable")
@@ -180,12 +180,12 @@ def scenario_plugin(name: str) -> Plugin:
     return known[name]
 
 
-def _target(build: Any) -> Any:  # noqa: ANN401
+def _target(build: Any) -> Any:
     """The class or function behind a table's entry."""
     return type(build.args[0]) if isinstance(build, partial) else build
 
 
-def _build(kind: Kind, plugin: Plugin, selector: Selector, extra: Mapping[str, Any]) -> Any:  # noqa: ANN401
+def _build(kind: Kind, plugin: Plugin, selector: Selector, extra: Mapping[str, Any]) -> Any:
     """Call a plug-in with the selector's parameters, converted to the types it declares."""
     parameters = plugin.parameters
     types = _annotations(plugin.build)
@@ -212,14 +212,15 @@ def _build(kind: Kind, plugin: Plugin, selector: Selector, extra: Mapping[str, A
 
 def _annotations(build: Callable[..., Any]) -> Mapping[str, Any]:
     target = _target(build)
-    target = target.__init__ if isinstance(target, type) else target
+    if isinstance(target, type) and not is_dataclass(target):
+        target = vars(target).get("__init__", target)
     try:
         return typing.get_type_hints(target)
     except (NameError, TypeError):
         return {}
 
 
-def _reason(error: msgspec.ValidationError, wanted: Any) -> str:  # noqa: ANN401
+def _reason(error: msgspec.ValidationError, wanted: Any) -> str:
     choices = typing.get_args(wanted) if typing.get_origin(wanted) is Literal else ()
     return "valid: " + ", ".join(map(str, choices)) if choices else str(error)
 
@@ -231,7 +232,8 @@ def _class_from_file(path: str, class_name: str) -> type:
     if not os.path.isfile(path):  # unlike Path.is_file, False for a name that is too long
         raise DikbenchError(f"formulation file not found: {path}")
     spec = importlib.util.spec_from_file_location(f"dikbench_user_{file.stem}", file)
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module  # dataclasses and pickle look it up there
     try:

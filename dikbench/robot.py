@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
-import pinocchio as pin
 
 from dikbench.array import Array
 from dikbench.errors import DikbenchError, unknown
@@ -100,7 +99,7 @@ class Robot:
         return checked_vector(q, self.nq, what)
 
 
-def frame_id(model: Any, frame: str) -> int:  # noqa: ANN401 (a Pinocchio model: no stubs)
+def frame_id(model: Any, frame: str) -> int:
     """Index of a frame of a model.
 
     Raises:
@@ -129,7 +128,7 @@ def checked_vector(value: object, size: int, what: str) -> Array:
     return vector
 
 
-def model_limits(model: Any) -> JointLimits:  # noqa: ANN401
+def model_limits(model: Any) -> JointLimits:
     """Read position, velocity and effort limits off a Pinocchio model.
 
     Joints with one coordinate and one velocity have position limits; continuous joints, planar

@@ -64,7 +64,7 @@ def _data_folder() -> Path:
 
 
 def _from_data(path: str, locked: tuple[str, ...] = ()) -> Callable[[], Any]:
-    def build() -> Any:  # noqa: ANN401
+    def build() -> Any:
         model = pin.buildModelFromUrdf(str(_data_folder() / path))
         if not locked:
             return model
@@ -155,7 +155,8 @@ def load_robot(name_or_urdf: str, frame: str | None = None, *, start: object = N
         return robot
     q0 = checked_vector(start, robot.nq, f"start of {text}")
     limits = robot.limits.at(q0)
-    assert limits.to_lower is not None and limits.to_upper is not None
+    assert limits.to_lower is not None
+    assert limits.to_upper is not None
     if np.any(limits.to_lower < 0) or np.any(limits.to_upper < 0):
         raise DikbenchError(f"start of {text}: {q0.tolist()} is outside the position limits")
     return replace(robot, q0=q0)
@@ -179,7 +180,9 @@ def _load_urdf(path: str, frame: str | None) -> Robot:
         model = pin.buildModelFromUrdf(path)
     except (ValueError, RuntimeError) as error:
         reason = str(error).strip().splitlines()[0] if str(error).strip() else "no reason given"
-        raise DikbenchError(f"robot file {path} is not a URDF that Pinocchio reads: {reason}") from None
+        raise DikbenchError(
+            f"robot file {path} is not a URDF that Pinocchio reads: {reason}"
+        ) from None
     if model.nv == 0:
         raise DikbenchError(f"robot file {path}: the model has no moving joint")
     if frame is None:
@@ -190,7 +193,7 @@ def _load_urdf(path: str, frame: str | None) -> Robot:
     return Robot(name, model, frame, limits, _well_conditioned_start(model, frame))
 
 
-def _well_conditioned_start(model: Any, frame: str) -> Array:  # noqa: ANN401
+def _well_conditioned_start(model: Any, frame: str) -> Array:
     """The posture with the largest smallest singular value among a few dozen inside the limits."""
     data, index = model.createData(), frame_id(model, frame)
     limits = model_limits(model)
@@ -210,4 +213,5 @@ def _well_conditioned_start(model: Any, frame: str) -> Array:  # noqa: ANN401
         sigma = np.linalg.svd(J, compute_uv=False)[min(6, model.nv) - 1]
         if sigma > best_sigma:
             best, best_sigma = q, float(sigma)
-    return best
+    start: Array = best
+    return start

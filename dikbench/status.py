@@ -19,7 +19,10 @@ class Status(Enum):
 
     OK = ("ok", "The step was answered, or the trial ran to its end.")
     STUCK = ("stuck", "The answer makes less than 1 % of the wanted motion.")
-    INFEASIBLE = ("infeasible", "The law's program has no feasible point; the fallback was applied.")
+    INFEASIBLE = (
+        "infeasible",
+        "The law's program has no feasible point; the fallback was applied.",
+    )
     SOLVER_FAILED = (
         "solver-failed",
         "The solver gave no answer although a feasible point exists; the fallback was applied.",
@@ -32,7 +35,10 @@ class Status(Enum):
     FORMULATION_ERROR = ("formulation-error", "The law raised an error that is not an answer.")
     WRONG_SHAPE = ("wrong-shape", "The law returned something that is not a vector of nv numbers.")
     NOT_FINITE = ("not-finite", "The law returned NaN or infinity.")
-    TIMEOUT = ("timeout", "The trial ran out of wall-clock time; lower its size or raise the limit.")
+    TIMEOUT = (
+        "timeout",
+        "The trial ran out of wall-clock time; lower its size or raise the limit.",
+    )
     OUT_OF_MEMORY = ("out-of-memory", "The trial asked for more memory than it may have.")
     CRASHED = ("crashed", "The worker process died under the trial.")
     SKIPPED = ("skipped", "The cell cannot work; the message says why.")

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 
@@ -121,17 +121,18 @@ def _explained(reason: str) -> str:
     return f"{reason}; valid keys: {valid}"
 
 
-def select(
-    base: Study,
-    *,
-    named: bool,
-    formulations: Sequence[str] = (),
-    scenarios: Sequence[str] = (),
-    solvers: Sequence[str] = (),
-    seeds: Sequence[int] = (),
-    plants: Sequence[str] = (),
-    references: Sequence[str] = (),
-) -> Study:
+class Selection(msgspec.Struct, frozen=True):
+    """What replaces axes of a study; an empty axis stays the study's own."""
+
+    formulations: tuple[str, ...] = ()
+    scenarios: tuple[str, ...] = ()
+    solvers: tuple[str, ...] = ()
+    seeds: tuple[int, ...] = ()
+    plants: tuple[str, ...] = ()
+    references: tuple[str, ...] = ()
+
+
+def select(base: Study, selection: Selection, *, named: bool) -> Study:
     """A study with some of its axes replaced.
 
     A formulation that is given without a solver keeps the solvers that a named study has for it;
@@ -139,28 +140,28 @@ def select(
 
     Args:
         base: the study to start from.
-        named: whether the user named it.
-        formulations, scenarios, solvers, seeds, plants, references: what replaces an axis; empty:
-            the study's own.
+        selection: what replaces its axes.
+        named: whether the user named the study.
     """
+    if selection == Selection():
+        return base
     cells = base.cells
-    if formulations:
-        cells = tuple(_cells_for(base, text, named) for text in formulations)
-    if solvers:
-        cells = tuple(msgspec.structs.replace(cell, solvers=tuple(solvers)) for cell in cells)
-    example = base.example if base.example in (scenarios or base.scenarios) else ""
-    changed = msgspec.structs.replace(
-        base,
-        cells=cells,
-        scenarios=tuple(scenarios) or base.scenarios,
-        seeds=tuple(seeds) or base.seeds,
-        plants=tuple(plants) or base.plants,
-        references=tuple(references) or base.references,
-        example=example,
-    )
-    if changed != base and not named:
-        changed = msgspec.structs.replace(changed, name="selection", description="from the command line")
-    return changed
+    if selection.formulations:
+        cells = tuple(_cells_for(base, text, named) for text in selection.formulations)
+    if selection.solvers:
+        cells = tuple(msgspec.structs.replace(c, solvers=selection.solvers) for c in cells)
+    changes: dict[str, Any] = {
+        axis: getattr(selection, axis)
+        for axis in ("scenarios", "seeds", "plants", "references")
+        if getattr(selection, axis)
+    }
+    if base.example not in (selection.scenarios or base.scenarios):
+        changes["example"] = ""
+    if base.timing is not None and selection.scenarios:
+        changes["timing"] = msgspec.structs.replace(base.timing, scenarios=())
+    if not named:
+        changes |= {"name": "selection", "description": "Selected on the command line"}
+    return msgspec.structs.replace(base, cells=cells, **changes)
 
 
 def _cells_for(base: Study, text: str, named: bool) -> Cells:
@@ -203,9 +204,7 @@ def expand(study: Study) -> list[PlannedTrial]:
     return list(planned.values())
 
 
-def _solvers_for(
-    study: Study, formulation: str, solvers: Sequence[str]
-) -> list[tuple[str, str]]:
+def _solvers_for(study: Study, formulation: str, solvers: Sequence[str]) -> list[tuple[str, str]]:
     """The solvers with which a law runs, each with the reason if the pair cannot work."""
     program = program_of(make_formulation(formulation))
     parsed = [(text, parse_solver(text)) for text in solvers]
@@ -213,6 +212,6 @@ def _solvers_for(
         return [(NO_SOLVER, "")]
     if not parsed:
         raise DikbenchError(
-            f"study {study.name}: formulation {formulation!r} needs a solver and its cells name none"
+            f"study {study.name}: formulation {formulation!r} needs a solver, its cells name none"
         )
     return [(text, why_not(solver, program)) for text, solver in parsed]

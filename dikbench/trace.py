@@ -62,5 +62,3 @@ class Trace:
         with np.load(path, allow_pickle=False) as stored:
             arrays = {field.name: stored[field.name] for field in fields(cls)}
         return cls(**{**arrays, "dt": float(arrays["dt"])})
-
-

@@ -1,4 +1,4 @@
-"""A trial: one cell of the benchmark matrix, as text that any process can turn into the real thing."""
+"""A trial: one cell of the benchmark matrix, as text from which any process can build it."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ class LpAlpha:
     the wanted direction is lost.
 
     Attributes:
-        regularization: rho; None: 1e-4 where the arm has more joints than the task has rows, else 0.
+        regularization: rho; None: 1e-4 if the arm has more joints than the task has rows, else 0.
         braking: how the box approaches a position limit (see `dikbench.box`).
 
     Source: Tedrake, Robotic Manipulation, ch. 3 (differential inverse kinematics in Drake).

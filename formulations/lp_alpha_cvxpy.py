@@ -26,7 +26,7 @@ class LpAlphaCvxpy:
     compiled once per process and shape. Same alpha as `lp-alpha`, a hundred times its price.
 
     Attributes:
-        regularization: rho; None: 1e-4 where the arm has more joints than the task has rows, else 0.
+        regularization: rho; None: 1e-4 if the arm has more joints than the task has rows, else 0.
         braking: how the box approaches a position limit (see `dikbench.box`).
 
     Source: Tedrake, Robotic Manipulation, ch. 3; Diamond & Boyd (2016), CVXPY.
@@ -58,7 +58,7 @@ class LpAlphaCvxpy:
 @lru_cache(maxsize=32)
 def _compiled(m: int, n: int, rho: float) -> tuple[Any, tuple[Any, Any], dict[str, Any]]:
     """The model for a task of m rows and an arm of n joints, its unknowns and its parameters."""
-    import cvxpy  # noqa: PLC0415 (costs a second, and only this law needs it)
+    import cvxpy
 
     v, alpha = cvxpy.Variable(n), cvxpy.Variable()
     given = {

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-
 import numpy as np
 import pinocchio as pin
 
@@ -100,5 +99,3 @@ def perturbed(robot: Robot, q: Array, seed: int, spread: float, fixed: tuple[int
     step[list(fixed)] = 0.0
     moved: Array = pin.integrate(robot.model, q, step)
     return moved
-
-

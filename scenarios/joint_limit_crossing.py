@@ -57,7 +57,7 @@ def joint_limit_crossing(
 
     One joint j moves as q_j(t) = q_max,j - approach + (approach + depth) sin^2(pi t/T), the others
     stand still, and the task frame is asked to follow: the target is out of reach, by this posture,
-    while q_j is beyond its limit. The UR5 crosses with its base, the Panda with its wrist (joint 6).
+    while q_j is beyond its limit. The UR5 crosses with its base, the Panda with joint 6.
     A seed moves the other joints by up to 0.1 rad.
 
     Args:
@@ -95,10 +95,13 @@ def joint_limit_crossing(
         return q
 
     def v_r(tau: float) -> Array:
-        return amplitude * pi / duration * np.sin(2 * pi * tau / duration) * out
+        v: Array = amplitude * pi / duration * np.sin(2 * pi * tau / duration) * out
+        return v
 
     steps = max(2, round(duration / dt))
-    motion = measure_motion(arm, np.array([q_r(k * duration / steps) for k in range(steps + 1)]), dt)
+    motion = measure_motion(
+        arm, np.array([q_r(k * duration / steps) for k in range(steps + 1)]), dt
+    )
     certificate = Certificate(
         (
             Claim("position margin at the start [rad]", motion.margin[0], at_least=0.02),

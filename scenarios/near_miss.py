@@ -165,7 +165,7 @@ def _fold(
     else:
         raise DikbenchError(f"scenario near-miss: no side of the fold of {arm.name} can be reached")
 
-    def placement(tau: float) -> Any:  # noqa: ANN401
+    def placement(tau: float) -> Any:
         return X_s * pin.exp6(pin.Motion((miss + speed * abs(tau - half)) * inward))
 
     def velocity(tau: float) -> Array:
@@ -184,7 +184,7 @@ def _certificate(
         Claim("its ratio to the one at the start", sigma / motion.sigma_min[0], at_most=0.7),
         Claim("position margin on the path [rad]", motion.margin.min(), at_least=0.05),
     ]
-    # Near a crossing the speed grows as 1/miss, near a fold as 1/sqrt(miss); both with room to spare.
+    # Near a crossing the speed grows as 1/miss, near a fold as 1/sqrt(miss); with room to spare.
     if miss > 0:
         least = 0.15 * speed / miss if where.kind == "crossing" else 0.6 * speed / np.sqrt(miss)
         claims.append(Claim("required speed over limit", motion.speed_ratio.max(), least))

@@ -64,7 +64,7 @@ def reach(
     twist = np.concatenate([distance * axis, angle * axis]) / np.linalg.norm(axis)
     twist[np.setdiff1d(np.arange(6), arm.task_rows)] = 0.0
     target = start * pin.exp6(pin.Motion(twist))
-    # The motion that a gain asks for: straight there, at first by gain times the distance per second.
+    # The motion that a gain asks for: straight there, at first at gain times the distance.
     straight = Reference(
         1 / gain,
         lambda tau: start * pin.exp6(pin.Motion(gain * tau * twist)),

@@ -31,7 +31,9 @@ class Figure:
     caption: str
 
 
-def draw_figures(folder: ResultsFolder, trials: pd.DataFrame, manifest: Mapping[str, Any]) -> list[Figure]:
+def draw_figures(
+    folder: ResultsFolder, trials: pd.DataFrame, manifest: Mapping[str, Any]
+) -> list[Figure]:
     """Draw every figure for which the results have data.
 
     Args:
@@ -53,8 +55,8 @@ def draw_figures(folder: ResultsFolder, trials: pd.DataFrame, manifest: Mapping[
             figures.append(
                 Figure(
                     drawn,
-                    f"Position error and largest joint speed over its limit against time, {example}, "
-                    "ideal plant (no clipping), one solver per law.",
+                    "Position error and largest joint speed over its limit against time, "
+                    f"{example}, ideal plant, one solver per law.",
                 )
             )
         figures.append(_off_course_against_progress(ran, target))
@@ -95,8 +97,8 @@ def _off_course_against_progress(ran: pd.DataFrame, target: Path) -> Figure:
     axes[0][0].set_ylabel("largest off course [deg]")
     figure.legend(*axes[0][0].get_legend_handles_labels(), loc="outside right upper")
     caption = (
-        "Off course against progress, a point per scenario: leaving the course and slowing down are "
-        "different failures. Best is the lower right corner."
+        "Off course against progress, a point per scenario: leaving the course and slowing down "
+        "are different failures. Best is the lower right corner."
     )
     return Figure(save(figure, target, "off_course_against_progress"), caption)
 
@@ -130,7 +132,7 @@ def _sweep(sweep: Sweep, target: Path) -> Figure:
     return Figure(file, caption)
 
 
-def _scale_by_values(axis: Any, values: list[float]) -> None:  # noqa: ANN401
+def _scale_by_values(axis: Any, values: list[float]) -> None:
     """A tick at every value of a sweep; logarithmic where they span a decade, zero at the left."""
     positive = [value for value in values if value > 0]
     if positive[-1] / positive[0] >= 10:
@@ -165,5 +167,3 @@ def _times(ran: pd.DataFrame, target: Path) -> Figure:
         "Compare ratios: absolute times belong to the machine in the manifest."
     )
     return Figure(save(figure, target, "time_per_law_and_solver"), caption)
-
-

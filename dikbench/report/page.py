@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import jinja2
 import pandas as pd
 
 from dikbench.report.figures import draw_figures
-from dikbench.report.tables import ALL, TABLES, make_table, markdown_rows, to_markdown
+from dikbench.report.tables import ALL, LAW, TABLES, make_table, markdown_rows, to_markdown
 from dikbench.run.results import ResultsFolder
 
 WORTH_SAYING = 0.01
@@ -62,24 +63,29 @@ def remarks(trials: pd.DataFrame) -> list[str]:
         "joint motion and agree in the task.",
     ]
     skipped = trials[trials["status"] == "skipped"]
-    for (formulation, solver, message), rows in skipped.groupby(
-        ["formulation", "solver", "message"], sort=False
-    ):
-        found.append(f"{formulation} with {solver}: {len(rows)} cells skipped: {message}.")
+    for formulation, solver, message, number in _counted(skipped, [*LAW, "message"]):
+        found.append(f"{formulation} with {solver}: {number} cells skipped: {message}.")
     failed = trials[~trials["status"].isin(["ok", "skipped"])]
-    for (formulation, solver, status), rows in failed.groupby(
-        ["formulation", "solver", "status"], sort=False
+    for formulation, solver, status, message, number in _counted(
+        failed, [*LAW, "status", "message"]
     ):
-        first = rows["message"].iloc[0]
-        found.append(f"{formulation} with {solver}: {len(rows)} trials {status}; first: {first}.")
+        found.append(f"{formulation} with {solver}: {number} trials {status}: {message}.")
     for column, words in (
         ("not_verified_share", "claimed success that the recheck denies"),
         ("solver_failed_share", "gave no answer to a feasible program"),
         ("relaxed_share", "had to give up an acceleration bound"),
     ):
-        worst = trials.groupby(["formulation", "solver"], sort=False)[column].max()
-        for (formulation, solver), share in worst[worst > WORTH_SAYING].items():
-            found.append(
-                f"{formulation} with {solver} {words} in up to {100 * share:.0f} % of a run's steps."
-            )
+        worst = trials.groupby(LAW, sort=False)[column].max().reset_index()
+        for formulation, solver, share in worst.itertuples(index=False, name=None):
+            if share > WORTH_SAYING:
+                percent = f"{100 * share:.0f} %"
+                found.append(
+                    f"{formulation} with {solver} {words} in up to {percent} of a run's steps."
+                )
     return found
+
+
+def _counted(rows: pd.DataFrame, columns: list[str]) -> list[tuple[Any, ...]]:
+    """How many rows share the values of some columns, the number last."""
+    counts = rows.groupby(columns, sort=False).size().reset_index()
+    return list(counts.itertuples(index=False, name=None))

@@ -42,7 +42,7 @@ def style() -> Iterator[None]:
 
 
 def look(number: int) -> dict[str, Any]:
-    """Colour, dash and width of the n-th curve; later ones are thinner, so that none hides another."""
+    """Colour, dash and width of the n-th curve; the later the thinner: none hides another."""
     return {
         "color": COLOURS[number % len(COLOURS)],
         "linestyle": DASHES[number % len(DASHES)],
@@ -63,7 +63,7 @@ def law_name(formulation: str, solver: str) -> str:
     return formulation if solver == "none" else f"{formulation}, {solver}"
 
 
-def save(figure: Any, folder: Path, name: str) -> str:  # noqa: ANN401 (a matplotlib Figure)
+def save(figure: Any, folder: Path, name: str) -> str:
     """Write a figure as SVG and return its file name."""
     file = f"{name}.svg"
     figure.savefig(folder / file, metadata={"Date": None})

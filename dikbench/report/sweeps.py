@@ -42,11 +42,11 @@ def sweeps(trials: pd.DataFrame) -> list[Sweep]:
         for parameter, text in selector.parameters.items():
             value = _number(text)
             if value is not None:
-                others = ",".join(f"{k}={v}" for k, v in selector.parameters.items() if k != parameter)
+                others = ",".join(
+                    f"{k}={v}" for k, v in selector.parameters.items() if k != parameter
+                )
                 groups.setdefault((selector.name, parameter, others), {})[scenario] = value
-    found = [
-        (key, values) for key, values in groups.items() if len(set(values.values())) >= FEWEST
-    ]
+    found = [(key, values) for key, values in groups.items() if len(set(values.values())) >= FEWEST]
     return [
         Sweep(
             number,

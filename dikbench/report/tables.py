@@ -122,11 +122,16 @@ def make_table(kind: TableKind, trials: pd.DataFrame) -> pd.DataFrame:
 
 
 def to_markdown(kind: TableKind, table: pd.DataFrame) -> str:
-    """The table as Markdown, a section per family, four significant digits, nothing where nothing is."""
+    """The table as Markdown, a section per family, four significant digits, NaN left empty."""
     lines = [f"# {kind.title}", ""]
     for name, part in table.groupby("family", sort=False):
         shown = part.drop(columns="family")
-        lines += [f"## {'All families' if name == ALL else name}", "", markdown_rows(shown), ""]
+        lines += [
+            f"## {'All families' if name == ALL else str(name)}",
+            "",
+            markdown_rows(shown),
+            "",
+        ]
     return "\n".join(lines)
 
 
@@ -144,4 +149,4 @@ def markdown_rows(table: pd.DataFrame) -> str:
 def _cell(value: object) -> str:
     if isinstance(value, float):
         return "" if value != value else f"{value:.4g}"  # NaN is unequal to itself
-    return str(value).replace("|", "\\|")
+    return f"{value!s}".replace("|", "\\|")

@@ -66,7 +66,9 @@ def _cpu() -> str:
 def _git_commit() -> str | None:
     """The commit of the checkout that dikbench runs from, "+" where it has changes; else None."""
     try:
-        _git("ls-files", "--error-unmatch", Path(__file__).name)  # not a wheel inside somebody's checkout
+        _git(
+            "ls-files", "--error-unmatch", Path(__file__).name
+        )  # not a wheel inside somebody's checkout
         return _git("rev-parse", "HEAD") + ("+" if _git("status", "--porcelain", "-uno") else "")
     except (OSError, subprocess.SubprocessError):
         return None

@@ -55,9 +55,7 @@ class ResultsFolder:
         if not os.access(self.path, os.W_OK | os.X_OK) or not os.access(self.traces, os.W_OK):
             raise DikbenchError(f"output folder {self.path} cannot be written: permission denied")
 
-    def write(
-        self, rows: Sequence[Row], times: Sequence[Row], manifest: dict[str, Any]
-    ) -> None:
+    def write(self, rows: Sequence[Row], times: Sequence[Row], manifest: dict[str, Any]) -> None:
         """Write the table and the manifest; each replaces its predecessor in one move."""
         columns = [*KEYS, "steps", *METRICS, *TIMES]
         frame = pd.DataFrame(list(rows))

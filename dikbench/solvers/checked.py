@@ -105,9 +105,9 @@ def make_solve(solver: Solver | None, program: Program | None) -> CheckedSolve:
     if solver is None or program is None:
         return NoSolve()
     if program == "cvxpy" or solver.interface == "cvxpy":
-        from dikbench.solvers.modelled import ModelledSolver  # noqa: PLC0415 (cvxpy costs a second)
+        from dikbench.solvers.modelled import ModelledSolver
 
         return CheckedSolve(ModelledSolver(solver))
-    from dikbench.solvers.cold import ColdSolver  # noqa: PLC0415 (every solver is imported by it)
+    from dikbench.solvers.cold import ColdSolver
 
     return CheckedSolve(ColdSolver(solver))

@@ -56,5 +56,5 @@ class ColdSolver:
         core_ns = int(1e9 * (solution.solve_time or 0.0))
         return Answer(x, claimed, solution.y, solution.z, solution.z_box, core_ns)
 
-    def _matrix(self, M: Any) -> Any:  # noqa: ANN401 (dense or sparse, as the back end wants it)
+    def _matrix(self, M: Any) -> Any:
         return csc_matrix(M) if self._sparse and M is not None else M

@@ -40,7 +40,7 @@ class PoseTask:
 
     def linearize(
         self, kinematics: Kinematics, target: Any = None, velocity: Array | None = None
-    ) -> LinearizedTask:  # noqa: ANN401 (a Pinocchio SE3: no stubs)
+    ) -> LinearizedTask:
         """The task at the configuration of `kinematics`.
 
         Args:
@@ -82,8 +82,8 @@ class LinearizedPose(LinearizedTask):
         error: Array,
         weight: float | Array,
         priority: int,
-        relative: Any,  # noqa: ANN401 (a Pinocchio SE3: no stubs)
-        rows: Any,  # noqa: ANN401
+        relative: Any,
+        rows: Any,
     ) -> None:
         super().__init__(J, V, error, weight, priority)
         self.relative = relative

@@ -1,0 +1,31 @@
+# Everything else is in the README; `make` alone lists the targets.
+PYTHON ?= .venv/bin/python
+
+help:            ## this list
+	@grep -E '^[a-z-]+: ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 18
+
+setup:           ## environment with the tested versions
+	python3 -m venv .venv && .venv/bin/pip install -c constraints.txt -e ".[test]"
+
+test:            ## the fast tests
+	$(PYTHON) -m pytest -m "not slow"
+
+test-slow:       ## the tests that take minutes
+	$(PYTHON) -m pytest -m slow
+
+lint:            ## style, format and types
+	$(PYTHON) -m ruff check . && $(PYTHON) -m ruff format --check . && $(PYTHON) -m mypy
+
+format:          ## mend the format
+	$(PYTHON) -m ruff format . && $(PYTHON) -m ruff check --fix .
+
+contract:        ## the contract suite against the built wheel, outside the checkout
+	tests/wheel_contract.sh
+
+quick:           ## the default study
+	.venv/bin/dikbench run
+
+constraints:     ## the installed versions become the tested ones
+	.venv/bin/pip freeze --exclude-editable --exclude pip --exclude setuptools > constraints.txt
+
+.PHONY: help setup test test-slow lint format contract quick constraints

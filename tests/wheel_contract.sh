@@ -1,0 +1,26 @@
+#!/usr/bin/env bash
+# The contract tests against the built wheel, in an environment outside the checkout: a wheel that
+# ships without its plug-ins cannot pass.
+set -euo pipefail
+checkout=$(cd "$(dirname "$0")/.." && pwd)
+python=${PYTHON:-$checkout/.venv/bin/python}
+outside=$(mktemp -d)
+trap 'rm -rf "$outside"' EXIT
+
+"$python" -m build --wheel --outdir "$outside/dist" "$checkout"
+"$python" -m venv "$outside/venv"
+"$outside/venv/bin/pip" install --quiet -c "$checkout/constraints.txt" \
+    "$outside"/dist/*.whl pytest hypothesis
+cp "$checkout/tests/formulations/test_contract.py" "$outside/"
+cd "$outside"
+venv/bin/python - <<'PY'
+import dikbench, formulations, scenarios
+from pathlib import Path
+for package in (dikbench, formulations, scenarios):
+    assert "site-packages" in package.__file__, package.__file__
+    assert (Path(package.__file__).parent / "py.typed").is_file(), package
+PY
+venv/bin/dikbench list
+venv/bin/pytest --import-mode=importlib test_contract.py
+venv/bin/dikbench run smoke --scenario reach --out runs/wheel > /dev/null
+test -s runs/wheel/report.md
