@@ -30,9 +30,24 @@ def one_line_errors(command: Callable[..., None]) -> Callable[..., None]:
     return wrapped
 
 
+def main() -> None:
+    """Run the command line; a wrong option is one line as well."""
+    try:
+        sys.exit(commands.main(standalone_mode=False))
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message())
+        sys.exit(2)
+    except click.ClickException as error:
+        click.echo("error: " + " ".join(error.format_message().split()), err=True)
+        sys.exit(2)
+    except click.Abort:
+        click.echo("interrupted: nothing was written", err=True)
+        sys.exit(130)
+
+
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(package_name="dikbench")
-def main() -> None:
+def commands() -> None:
     """Compare laws of differential inverse kinematics in closed loop, on real robot models.
 
     A selector is a name, with parameters where wanted: 'dls[damping=0.1]',
@@ -40,7 +55,7 @@ def main() -> None:
     """
 
 
-@main.command()
+@commands.command()
 @click.argument("study", required=False)
 @click.option(
     "--formulation",
@@ -129,7 +144,7 @@ def run(
     click.echo(f"\n{folder / 'report.md'}")
 
 
-@main.command("list")
+@commands.command("list")
 @click.argument("subject", required=False, type=click.Choice(SUBJECTS))
 @one_line_errors
 def list_(subject: str | None) -> None:
@@ -143,7 +158,7 @@ def list_(subject: str | None) -> None:
             click.echo(f"  {line}" if subject is None else line)
 
 
-@main.command()
+@commands.command()
 @click.argument("name")
 @one_line_errors
 def show(name: str) -> None:

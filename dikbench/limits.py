@@ -22,6 +22,12 @@ class Interval:
     lower: Array
     upper: Array
 
+    def usage(self, values: Array) -> Array:
+        """Values (..., nv) over the bound on their own side; infinite past a bound of zero."""
+        bound = np.abs(np.where(values > 0, self.upper, self.lower))
+        with np.errstate(divide="ignore"):
+            return np.divide(np.abs(values), bound, out=np.zeros_like(values), where=values != 0)
+
 
 @dataclass(frozen=True, eq=False)
 class JointLimits:

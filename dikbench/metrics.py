@@ -89,7 +89,7 @@ def _peak_ratio(motion: Motion) -> float:
     v = motion.trace.applied
     if limit is None or not len(v):
         return float("nan")
-    return float(np.maximum(v / limit.upper, v / limit.lower).max())
+    return float(limit.usage(v).max())
 
 
 def _position_violations(motion: Motion) -> Array:

@@ -104,11 +104,7 @@ def measure_motion(robot: Robot, q: Array, dt: float) -> OracleMotion:
         sigma.append(smallest_singular_value(kinematics.jacobian(robot.frame_id)[rows]))
         margin.append(position_margin(robot, sample))
     limit = robot.limits.velocity
-    ratio = (
-        np.zeros(len(v))
-        if limit is None
-        else np.maximum(v / limit.upper, v / limit.lower).max(axis=1)
-    )
+    ratio = np.zeros(len(v)) if limit is None else limit.usage(v).max(axis=1)
     return OracleMotion(q, v, np.array(sigma), ratio, np.array(margin))
 
 

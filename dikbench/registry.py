@@ -16,6 +16,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, is_dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, Literal
 
 import msgspec
@@ -61,9 +62,11 @@ class Plugin:
     @property
     def parameters(self) -> Mapping[str, inspect.Parameter]:
         """Its parameters, with their defaults."""
+        law = _preset(self.build)
+        signature = inspect.signature(self.build if law is None else type(law))
         return {
-            name: parameter
-            for name, parameter in inspect.signature(self.documented).parameters.items()
+            name: parameter if law is None else parameter.replace(default=getattr(law, name))
+            for name, parameter in signature.parameters.items()
             if parameter.kind not in {parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD}
         }
 
@@ -95,7 +98,7 @@ def plugins(kind: Kind) -> Mapping[str, Plugin]:
             )
         for name, build in table.items():
             plugin = _checked(kind, name, build, file)
-            if name in found and found[name].build is not plugin.build:
+            if name in found and _entry(found[name].build) is not _entry(plugin.build):
                 raise DikbenchError(
                     f"two plug-ins are called {name!r}: {found[name].file} and {plugin.file}"
                 )
@@ -109,7 +112,7 @@ def plugins(kind: Kind) -> Mapping[str, Plugin]:
 
 
 def _checked(kind: Kind, name: object, build: object, file: str) -> Plugin:
-    if not isinstance(name, str) or set(name) & set("[],= \t\n"):
+    if not isinstance(name, str) or not name or set(name) & set("[],= \t\n"):
         raise DikbenchError(f"{file}: {name!r} is not a name (no brackets, commas or spaces)")
     if kind == "formulation" and is_dataclass(build) and not isinstance(build, type):
         build = partial(replace, build)  # a law with its parameters set: they are the defaults
@@ -180,23 +183,36 @@ def scenario_plugin(name: str) -> Plugin:
     return known[name]
 
 
+def _preset(build: Any) -> Any:
+    """The law with its parameters set that a table holds in place of a class; else None."""
+    return build.args[0] if isinstance(build, partial) and build.func is replace else None
+
+
+def _entry(build: Any) -> Any:
+    """What stood in the table."""
+    law = _preset(build)
+    return build if law is None else law
+
+
 def _target(build: Any) -> Any:
     """The class or function behind a table's entry."""
-    return type(build.args[0]) if isinstance(build, partial) else build
+    law = _preset(build)
+    if law is not None:
+        return type(law)
+    return build.func if isinstance(build, partial) else build
 
 
 def _build(kind: Kind, plugin: Plugin, selector: Selector, extra: Mapping[str, Any]) -> Any:
     """Call a plug-in with the selector's parameters, converted to the types it declares."""
     parameters = plugin.parameters
-    types = _annotations(plugin.build)
     values = dict(extra)
     for name, text in selector.parameters.items():
         if name not in parameters:
             raise unknown(f"parameter of {kind} {plugin.name}", name, set(parameters) - {"seed"})
-        wanted = types.get(name, str)
+        wanted = _type_of(plugin.documented, parameters[name])
         try:
             values[name] = msgspec.convert(text, wanted, strict=False)
-        except msgspec.ValidationError as error:
+        except (msgspec.ValidationError, TypeError) as error:  # a TypeError: no text can give it
             raise DikbenchError(
                 f"{kind} {plugin.name}: {name}={text!r} is not valid: {_reason(error, wanted)}"
             ) from None
@@ -207,20 +223,35 @@ def _build(kind: Kind, plugin: Plugin, selector: Selector, extra: Mapping[str, A
     ]
     if missing:
         raise DikbenchError(f"{kind} {plugin.name}: parameter {missing[0]!r} must be given")
-    return plugin.build(**values)
-
-
-def _annotations(build: Callable[..., Any]) -> Mapping[str, Any]:
-    target = _target(build)
-    if isinstance(target, type) and not is_dataclass(target):
-        target = vars(target).get("__init__", target)
     try:
-        return typing.get_type_hints(target)
-    except (NameError, TypeError):
-        return {}
+        return plugin.build(**values)
+    except (DikbenchError, MemoryError):
+        raise
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}".partition("\n")[0]
+        raise DikbenchError(f"{kind} {plugin.name} of {plugin.file}: {reason}") from error
 
 
-def _reason(error: msgspec.ValidationError, wanted: Any) -> str:
+def _type_of(target: Any, parameter: inspect.Parameter) -> Any:
+    """The type that a parameter declares; where it declares none that is known here, its default's.
+
+    Each is resolved by itself: one name that is imported for type checkers only must not turn the
+    numbers beside it into texts.
+    """
+    alone = SimpleNamespace(__annotations__={parameter.name: parameter.annotation})
+    for owner in getattr(target, "__mro__", (target,)):
+        names = getattr(sys.modules.get(owner.__module__), "__dict__", {})
+        try:
+            found = typing.get_type_hints(alone, names)[parameter.name]
+        except (NameError, AttributeError, TypeError, SyntaxError):
+            continue
+        if found is not parameter.empty:
+            return found
+    number: dict[type, Any] = {bool: bool, int: int | float, float: float}
+    return number.get(type(parameter.default), str)
+
+
+def _reason(error: Exception, wanted: Any) -> str:
     choices = typing.get_args(wanted) if typing.get_origin(wanted) is Literal else ()
     return "valid: " + ", ".join(map(str, choices)) if choices else str(error)
 

@@ -16,6 +16,7 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.array import Array
+from dikbench.captured_stderr import captured_stderr
 from dikbench.errors import DikbenchError, unknown
 from dikbench.planar_arm import planar_arm
 from dikbench.robot import Robot, checked_vector, frame_id, model_limits
@@ -176,13 +177,14 @@ def _load_named(name: str) -> Robot:
 def _load_urdf(path: str, frame: str | None) -> Robot:
     if not os.path.isfile(path):  # unlike Path.is_file, False for a name that is too long
         raise DikbenchError(f"robot file not found: {path}")
-    try:
-        model = pin.buildModelFromUrdf(path)
-    except (ValueError, RuntimeError) as error:
-        reason = str(error).strip().splitlines()[0] if str(error).strip() else "no reason given"
-        raise DikbenchError(
-            f"robot file {path} is not a URDF that Pinocchio reads: {reason}"
-        ) from None
+    with captured_stderr() as complaints:
+        try:
+            model = pin.buildModelFromUrdf(path)
+        except (ValueError, RuntimeError) as error:
+            reason = " ".join(f"{error} {complaints()}".split())
+            raise DikbenchError(
+                f"robot file {path} is not a URDF that Pinocchio reads: {reason}"
+            ) from None
     if model.nv == 0:
         raise DikbenchError(f"robot file {path}: the model has no moving joint")
     if frame is None:

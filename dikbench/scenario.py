@@ -6,9 +6,12 @@ from dataclasses import dataclass
 
 from dikbench.array import Array
 from dikbench.certificate import Certificate
+from dikbench.errors import DikbenchError
 from dikbench.references import Reference
 from dikbench.robot import Robot
 from dikbench.tasks.task import Task
+
+MOST_STEPS = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +40,18 @@ class Scenario:
     duration: float
     certificate: Certificate
     tasks: tuple[Task, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check that a run is of a size that ends.
+
+        Raises:
+            DikbenchError: if it is not.
+        """
+        if not 1 <= self.duration / self.dt <= MOST_STEPS:
+            raise DikbenchError(
+                f"a run of {self.duration:g} s at dt = {self.dt:g} s has "
+                f"{self.duration / self.dt:.3g} steps; valid: 1 to {MOST_STEPS}"
+            )
 
     @property
     def steps(self) -> int:

@@ -186,7 +186,7 @@ def check_picklable(formulation: Formulation, solver: str | None = None) -> None
 
 
 def _compare(first: _Asked, second: _Asked, what: str) -> None:
-    """Ask the first forwards through the states, the second backwards with the scratch data used."""
+    """Ask one forwards through the states, the other backwards, with other scratch data."""
     velocities = [first.answer(state.problem).velocity for state in states()]
     for v, state in reversed([*zip(velocities, states(), strict=True)]):
         robot = state.problem.robot

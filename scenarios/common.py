@@ -68,7 +68,7 @@ def start_velocity(robot: Robot, reference: Reference, q0: Array) -> Array:
     limit = robot.limits.velocity
     if limit is None:
         return v
-    return v / max(1.0, float(np.maximum(v / limit.upper, v / limit.lower).max()))
+    return v / max(1.0, float(limit.usage(v).max()))
 
 
 def placement_of(robot: Robot, q: Array) -> pin.SE3:

@@ -101,11 +101,15 @@ def make_table(kind: TableKind, trials: pd.DataFrame) -> pd.DataFrame:
         Columns family, plant, formulation, solver, trials, failed, and the table's own.
     """
     timing = kind is TABLES["timing"]
-    frame = trials[trials["status"] != "skipped"].assign(family=trials["scenario"].map(family))
+    ran = trials[trials["status"] != "skipped"]
+    frame = ran.assign(family=ran["scenario"].map(family))
     if timing:
         # Times belong to a law, a solver and a scenario; they stand on the row of each plant.
         frame = frame.drop_duplicates([*LAW, "scenario"]).assign(plant=ALL)
         frame = frame[frame["law_time_median_us"].notna()]
+    if frame.empty:
+        headings = ["family", *([] if timing else ["plant"]), *LAW]
+        return pd.DataFrame(columns=[*headings, *(column.heading for column in kind.columns)])
     whole = frame.assign(family=ALL)
     parts = []
     for part in (whole, frame):
@@ -136,14 +140,24 @@ def to_markdown(kind: TableKind, table: pd.DataFrame) -> str:
 
 
 def markdown_rows(table: pd.DataFrame) -> str:
-    """A data frame as a Markdown table."""
-    head = "| " + " | ".join(map(str, table.columns)) + " |"
-    rule = "|" + "|".join("---:" if kind.kind in "if" else "---" for kind in table.dtypes) + "|"
-    rows = [
-        "| " + " | ".join(_cell(value) for value in row) + " |"
-        for row in table.itertuples(index=False, name=None)
-    ]
-    return "\n".join([head, rule, *rows])
+    """A data frame as a Markdown table, its columns aligned for reading as text."""
+    numeric = [kind.kind in "if" for kind in table.dtypes]
+    rows = [[_cell(value) for value in row] for row in table.itertuples(index=False, name=None)]
+    cells = [[str(name) for name in table.columns], *rows]
+    widths = [max(3, *(len(row[i]) for row in cells)) for i in range(len(numeric))]
+
+    def line(row: list[str]) -> str:
+        padded = (
+            text.rjust(width) if right else text.ljust(width)
+            for text, width, right in zip(row, widths, numeric, strict=True)
+        )
+        return "| " + " | ".join(padded) + " |"
+
+    rule = "|".join(
+        "-" * (width + 1) + (":" if right else "-")
+        for width, right in zip(widths, numeric, strict=True)
+    )
+    return "\n".join([line(cells[0]), f"|{rule}|", *map(line, rows)])
 
 
 def _cell(value: object) -> str:

@@ -17,6 +17,9 @@ from dikbench.scenario import Scenario
 from dikbench.trace import Trace
 from dikbench.trial import Trial
 
+LEAST = 1e-3
+"""Nothing below this [mm, or share of a limit] is drawn: the axes are logarithmic."""
+
 
 def draw_time_series(
     folder: ResultsFolder, rows: pd.DataFrame, scenario_name: str, target: Path
@@ -43,7 +46,7 @@ def draw_time_series(
     for number, (name, trace) in enumerate(traces.items()):
         motion = recompute(trace, scenario)
         time = np.arange(trace.steps + 1) * trace.dt
-        upper.plot(time, np.maximum(1e3 * motion.position_error, 1e-3), label=name, **look(number))
+        upper.plot(time, np.maximum(1e3 * motion.position_error, LEAST), label=name, **look(number))
         lower.plot(time[:-1], _speed_ratio(trace, scenario), label=name, **look(number))
     upper.set_yscale("log")
     upper.set_ylabel("position error [mm]")
@@ -63,5 +66,4 @@ def _speed_ratio(trace: Trace, scenario: Scenario) -> Array:
     limit = scenario.robot.limits.velocity
     if limit is None:
         return np.full(trace.steps, np.nan)
-    ratio: Array = np.maximum(trace.applied / limit.upper, trace.applied / limit.lower).max(axis=1)
-    return np.maximum(ratio, 1e-3)
+    return np.maximum(limit.usage(trace.applied).max(axis=1), LEAST)

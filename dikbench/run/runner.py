@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from concurrent.futures import Future, as_completed
 from pathlib import Path
@@ -20,6 +21,9 @@ from dikbench.study import PlannedTrial, Study, expand
 
 TRIAL_TIMEOUT = 120.0
 """Wall-clock limit of a trial [s], enforced from outside its process."""
+
+TIMING_TIMEOUT = 1800.0
+"""Wall-clock limit of the timing of one scenario [s]."""
 
 
 def run_study(study: Study, out: Path, jobs: int, command: str) -> ResultsFolder:
@@ -89,13 +93,23 @@ def time_cells(study: Study, planned: Sequence[PlannedTrial]) -> list[Row]:
     )
     scenarios = [s for s in study.scenarios if not timing.scenarios or s in timing.scenarios]
     rows: list[Row] = []
+    if not cells:
+        return rows
     with workers(1) as pool, ProgressDisplay(len(scenarios), "timed scenarios") as display:
         arguments: tuple[Any, ...] = (cells, timing.reference, timing.problems, timing.rounds)
         futures = [
-            pool.schedule(time_scenario, args=(scenario, study.seeds[0], *arguments))
+            pool.schedule(
+                time_scenario,
+                args=(scenario, study.seeds[0], *arguments),
+                timeout=TIMING_TIMEOUT,
+            )
             for scenario in scenarios
         ]
-        for future in futures:
-            rows.extend(future.result())
+        for scenario, future in zip(scenarios, futures, strict=True):
+            try:
+                rows.extend(future.result())
+            except Exception as error:  # a law can take the process with it: no times, no harm
+                reason = f"{type(error).__name__}: {error}".partition("\n")[0]
+                print(f"no times for {scenario}: {reason}", file=sys.stderr)
             display.advance()
     return rows

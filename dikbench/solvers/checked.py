@@ -6,6 +6,8 @@ from collections.abc import Callable
 from time import perf_counter_ns
 from typing import Any
 
+import numpy as np
+
 from dikbench.array import Array
 from dikbench.errors import DikbenchError, Infeasible, SolverFailed
 from dikbench.modelled_program import ModelledProgram
@@ -24,7 +26,8 @@ class CheckedSolve:
         solve_ns: time inside the solver and its interface [ns].
         core_ns: the solver library's own share of it [ns].
         checking_ns: time spent on rechecking, which belongs to nobody's clock [ns].
-        primal, dual, gap: the largest residuals of the step (see `residuals`).
+        primal, dual, gap: the largest residuals of the step (see `residuals`); NaN where one is
+            not known.
         verified: whether every answer that claimed success was within tolerance.
     """
 
@@ -76,8 +79,8 @@ class CheckedSolve:
             raise Infeasible("the program has no feasible point")
         found = residuals(matrices, answer)
         self.primal = max(self.primal, found.primal)
-        self.dual = max(self.dual, found.dual)
-        self.gap = max(self.gap, found.gap)
+        self.dual = float(np.maximum(self.dual, found.dual))  # what is not known stays NaN
+        self.gap = float(np.maximum(self.gap, found.gap))
         self.verified = self.verified and found.verified
         return answer.x
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -16,6 +18,9 @@ from dikbench.solvers.catalogue import Solver
 SPARSE: Final = frozenset({"osqp", "clarabel", "highs"})
 """Back ends that take sparse matrices; handing them over dense costs a warning and a conversion."""
 
+UNSAID: Final[Mapping[str, Mapping[str, Any]]] = MappingProxyType({"osqp": {"raise_error": False}})
+"""What we say to a back end so that its default, today the same, may change (OSQP warns of it)."""
+
 # A failure is in the answer; a warning beside each would drown the run.
 warnings.filterwarnings("ignore", module=r"qpsolvers\.")
 
@@ -27,7 +32,7 @@ class ColdSolver:
 
     def __init__(self, solver: Solver) -> None:
         self._name = solver.name
-        self._settings = dict(solver.settings)
+        self._settings = {**UNSAID.get(solver.name, {}), **solver.settings}
         self._sparse = solver.name in SPARSE
 
     def __call__(self, program: QuadraticProgram) -> Answer:
@@ -49,7 +54,7 @@ class ColdSolver:
         )
         try:
             solution = qpsolvers.solve_problem(problem, solver=self._name, **self._settings)
-        except (qpsolvers.exceptions.QPError, ValueError, RuntimeError):
+        except Exception:  # each library has its own (OSQP's is not among those of qpsolvers)
             return Answer(None, claimed=False)
         x = solution.x
         claimed = bool(solution.found) and x is not None and bool(np.isfinite(x).all())

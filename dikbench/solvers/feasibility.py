@@ -15,10 +15,14 @@ def is_feasible(program: QuadraticProgram) -> bool:
     upper = np.full(n, np.inf) if program.ub is None else program.ub
     if np.any(lower > upper):
         return False
+    G, h = program.G, program.h
+    if G is not None and h is not None:
+        finite = np.isfinite(h)  # a relaxed bound constrains nothing
+        G, h = G[finite], h[finite]
     result = linprog(
         np.zeros(n),
-        A_ub=program.G,
-        b_ub=program.h,
+        A_ub=G,
+        b_ub=h,
         A_eq=program.A,
         b_eq=program.b,
         bounds=np.column_stack([lower, upper]),

@@ -1,0 +1,377 @@
+"""Progress, off course, and every metric, against values computed by hand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from dikbench.array import Array
+from dikbench.certificate import Certificate
+from dikbench.metrics import METRICS, evaluate
+from dikbench.motion import recompute
+from dikbench.progress import DWELL, STOPPED, off_course, progress, row_weights
+from dikbench.references import target_at_rest
+from dikbench.robot_catalogue import load_robot
+from dikbench.scenario import Scenario
+from dikbench.status import STEP_CODE, Status
+from dikbench.trace import Trace
+
+SPACE = row_weights((0, 1, 2, 3, 4, 5))
+EQUAL = np.ones(6)
+X = np.array([1.0, 0, 0, 0, 0, 0])
+Y = np.array([0, 1.0, 0, 0, 0, 0])
+ROLL = np.array([0, 0, 0, 1.0, 0, 0])
+
+twists = arrays(float, 6, elements=st.floats(-5, 5))
+
+
+def _both(wanted: Array, achieved: Array, weights: Array = SPACE) -> tuple[float, float]:
+    V, V_a = wanted[None], achieved[None]
+    return float(progress(V, V_a, weights)[0]), float(off_course(V, V_a, weights)[0])
+
+
+# --- progress and off course
+
+
+def test_rows_of_a_rotation_weigh_in_by_a_length() -> None:
+    """M = diag(1, 1, 1, L^2, L^2, L^2) with L = 0.2 m; the weights are its square roots."""
+    assert np.array_equal(SPACE, [1, 1, 1, 0.2, 0.2, 0.2])
+    assert np.array_equal(row_weights((0, 1, 5)), [1, 1, 0.2])
+    assert np.array_equal(row_weights((3, 0), length=0.5), [0.5, 1])
+
+
+@pytest.mark.parametrize(
+    ("wanted", "achieved", "alpha", "angle"),
+    [
+        (2 * X, 2 * X, 1.0, 0.0),
+        (2 * X, X, 0.5, 0.0),
+        (2 * X, 3 * X, 1.5, 0.0),
+        (2 * X, -2 * X, -1.0, math.pi),  # reversal
+        (X, Y, 0.0, math.pi / 2),
+        (X, X + Y, 1.0, math.pi / 4),
+        (X, -X + Y, -1.0, 3 * math.pi / 4),
+        (X, X + 5 * ROLL, 1.0, math.pi / 4),  # 5 rad/s at 0.2 m is 1 m/s
+        (ROLL, 0.5 * ROLL, 0.5, 0.0),
+        # Wanted 0.3 m/s and 2 rad/s (0.4 m/s); achieved the translation alone: 0.09/0.25.
+        (0.3 * X + 2 * ROLL, 0.3 * X, 0.36, math.acos(0.6)),
+    ],
+)
+def test_progress_and_off_course_by_hand(
+    wanted: Array, achieved: Array, alpha: float, angle: float
+) -> None:
+    """alpha = <V_a, V>/|V|^2 and the angle between the two, in the metric M."""
+    got_alpha, got_angle = _both(wanted, achieved)
+    assert got_alpha == pytest.approx(alpha)
+    assert got_angle == pytest.approx(angle)
+
+
+def test_the_length_decides_between_translation_and_rotation() -> None:
+    """With M = I the same twists have another angle: acos(0.3 / |(0.3, 2)|)."""
+    _, angle = _both(0.3 * X + 2 * ROLL, 0.3 * X, EQUAL)
+    assert angle == pytest.approx(math.acos(0.3 / math.hypot(0.3, 2)))
+
+
+@pytest.mark.parametrize("angle", [1e-12, 1e-8, 1e-4])
+def test_small_angles_are_not_lost(angle: float) -> None:
+    """The inverse cosine would return 0 for 1e-8 rad."""
+    _, got = _both(X, math.cos(angle) * X + math.sin(angle) * Y)
+    assert got == pytest.approx(angle, rel=1e-6)
+
+
+@pytest.mark.parametrize("angle", [1e-8, 1e-4])
+def test_angles_near_reversal_are_not_lost(angle: float) -> None:
+    """Nor pi minus a little."""
+    _, got = _both(X, -math.cos(angle) * X + math.sin(angle) * Y)
+    assert math.pi - got == pytest.approx(angle, rel=1e-6)
+
+
+def test_a_dwell_has_neither() -> None:
+    """Where nothing is wanted there is no direction; just above the threshold there is one."""
+    for wanted in (0 * X, 0.99 * DWELL * X, 0.99 * DWELL / 0.2 * ROLL):
+        alpha, angle = _both(wanted, X)
+        assert math.isnan(alpha)
+        assert math.isnan(angle)
+    alpha, angle = _both(1.01 * DWELL * X, 1.01 * DWELL * X)
+    assert (alpha, angle) == pytest.approx((1.0, 0.0))
+
+
+def test_standing_still_is_stopped_and_not_on_course() -> None:
+    """No angle, but a progress of zero; just above the threshold there is an angle."""
+    assert _both(X, 0 * X)[0] == 0.0
+    assert math.isnan(_both(X, 0 * X)[1])
+    assert math.isnan(_both(X, 0.99 * STOPPED * Y)[1])
+    assert _both(X, 1.01 * STOPPED * Y)[1] == pytest.approx(math.pi / 2)
+
+
+def test_each_step_stands_for_itself() -> None:
+    """A dwell, a stop, a reversal and a good step in one array."""
+    wanted, achieved = np.array([0 * X, X, X, X]), np.array([X, 0 * X, -X, X])
+    assert progress(wanted, achieved, SPACE) == pytest.approx([np.nan, 0, -1, 1], nan_ok=True)
+    assert off_course(wanted, achieved, SPACE) == pytest.approx(
+        [np.nan, np.nan, np.pi, 0], nan_ok=True
+    )
+
+
+def test_no_steps_have_no_values() -> None:
+    """Empty in, empty out."""
+    nothing = np.empty((0, 6))
+    assert progress(nothing, nothing, SPACE).shape == (0,)
+    assert off_course(nothing, nothing, SPACE).shape == (0,)
+
+
+@settings(deadline=None)
+@given(wanted=twists, achieved=twists, scale=st.floats(0.1, 10))
+def test_progress_and_off_course_agree(wanted: Array, achieved: Array, scale: float) -> None:
+    """alpha |V| = |V_a| cos(angle); the angle does not depend on how fast, alpha does."""
+    alpha, angle = _both(wanted, achieved)
+    size, size_a = np.linalg.norm(SPACE * wanted), np.linalg.norm(SPACE * achieved)
+    if math.isnan(angle) or min(size, size_a) < 1e-2:
+        return
+    assert 0 <= angle <= math.pi
+    assert alpha * size == pytest.approx(size_a * math.cos(angle), rel=1e-9, abs=1e-9)
+    faster_alpha, same_angle = _both(wanted, scale * achieved)
+    assert faster_alpha == pytest.approx(scale * alpha, rel=1e-9, abs=1e-12)
+    assert same_angle == pytest.approx(angle, rel=1e-6, abs=1e-9)
+
+
+# --- metrics of a motion made by hand
+#
+# The planar arm at q = (q_1, 90 deg, 0): its tip is at (0.4, 0.5), 0.41^(1/2) m away from the base,
+# turned by q_1 and pointing 90 deg to the left. A speed w of joint 1 moves it, in its own axes, with
+# (0.4, 0.5, 1) w; the body Jacobian depends on q_2 and q_3 only.
+
+J = np.array([[0.4, 0.0, 0.0], [0.5, 0.5, 0.2], [1.0, 1.0, 1.0]])
+STEP = J[:, 0]
+RADIUS = math.sqrt(0.41)
+
+
+def _scenario() -> Scenario:
+    """Hold the tip where it is at q_1 = 0; limits of 0.05 rad, 1.5 rad/s and 20 rad/s^2."""
+    robot = load_robot("planar3r").with_limits(
+        position=([-0.25, -2, -2], [0.05, 2, 2]), velocity=(-1.5, 4.0), acceleration=20.0
+    )
+    target = pin.SE3(pin.utils.rotate("z", np.pi / 2), np.array([0.4, 0.5, 0.0]))
+    return Scenario(
+        robot=robot,
+        q0=np.array([0.0, np.pi / 2, 0.0]),
+        v0=np.array([0.5, 0.0, 0.0]),
+        reference=target_at_rest(target, 0.4),
+        gain=1.0,
+        dt=0.1,
+        duration=0.4,
+        certificate=Certificate(()),
+    )
+
+
+def _trace(speeds: list[float], wanted: list[list[float]], statuses: list[Status]) -> Trace:
+    """Joint 1 moves at the given speeds from q_1 = 0 on, for 0.1 s each."""
+    n = len(speeds)
+    q = np.zeros((n + 1, 3))
+    q[:, 0] = np.concatenate([[0.0], np.cumsum(speeds)]) * 0.1
+    q[:, 1] = np.pi / 2
+    applied = np.zeros((n, 3))
+    applied[:, 0] = speeds
+    return Trace(
+        dt=0.1,
+        q=q,
+        tau=0.1 * np.arange(n + 1),
+        wanted=np.array(wanted).reshape(n, 3),
+        commanded=applied + 100.0,  # nothing may be read off the command
+        applied=applied,
+        status=np.array([STEP_CODE[s] for s in statuses], dtype=int),
+        relaxed=np.array([0, 2, 0, 1][:n], dtype=int),
+        primal=np.zeros(n),
+        dual=np.zeros(n),
+        gap=np.zeros(n),
+    )
+
+
+def _four_steps() -> dict[str, float]:
+    """q_1 = 0, 0.1, -0.1, -0.2, -0.2: forward, back too fast, back, stopped."""
+    trace = _trace(
+        speeds=[1.0, -2.0, -1.0, 0.0],
+        wanted=[
+            [0.4, 0.5, 1.0],  # done as wanted
+            [0.4, 0.5, 1.0],  # twice as fast, in reverse
+            [-0.8, -1.0, -2.0],  # half of it
+            [0.4, 0.5, 1.0],  # nothing of it
+        ],
+        statuses=[Status.OK, Status.SOLVER_FAILED, Status.NOT_VERIFIED, Status.INFEASIBLE],
+    )
+    return evaluate(recompute(trace, _scenario()))
+
+
+def _chord(angle: float) -> float:
+    """How far the tip is from where it was, after a turn about the base."""
+    return 2 * RADIUS * math.sin(abs(angle) / 2)
+
+
+def _rms(*values: float) -> float:
+    return math.sqrt(sum(value**2 for value in values) / len(values))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("position_error_rms_m", _rms(0, _chord(0.1), _chord(0.1), _chord(0.2), _chord(0.2))),
+        ("position_error_max_m", _chord(0.2)),
+        ("position_error_final_m", _chord(0.2)),
+        ("orientation_error_rms_rad", _rms(0, 0.1, 0.1, 0.2, 0.2)),
+        ("orientation_error_max_rad", 0.2),
+        ("orientation_error_final_rad", 0.2),
+        ("off_course_max_rad", math.pi),
+        ("progress_mean", (1.0 - 2.0 + 0.5 + 0.0) / 4),
+        ("progress_min", -2.0),
+        ("velocity_peak_ratio", 2.0 / 1.5),
+        ("position_violation_max_rad", 0.05),
+        ("velocity_violation_max_rad_s", 0.5),
+        # Speeds 0.5 (before), 1, -2, -1, 0: accelerations 5, -30, 10, 10.
+        ("acceleration_violation_max_rad_s2", 10.0),
+        ("violating_share", 2 / 4),  # the first ends beyond a limit, the second is too fast
+        ("infeasible_share", 1 / 4),
+        ("solver_failed_share", 1 / 4),
+        ("not_verified_share", 1 / 4),
+        ("stuck_share", 0.0),
+        ("relaxed_share", 2 / 4),
+        ("joint_travel_rad", 0.4),
+        ("sigma_min", np.linalg.svd(J, compute_uv=False)[-1]),
+    ],
+)
+def test_every_metric_of_a_motion_made_by_hand(name: str, value: float) -> None:
+    """Four steps of the planar arm about its base, with the values of a pocket calculator."""
+    assert _four_steps()[name] == pytest.approx(value, abs=1e-12)
+
+
+def test_no_metric_is_left_out_of_the_test_above() -> None:
+    """A new metric needs a line there."""
+    marks = test_every_metric_of_a_motion_made_by_hand.pytestmark  # type: ignore[attr-defined]
+    assert {name for name, _ in marks[0].args[1]} == set(METRICS)
+
+
+def test_a_slant_of_the_motion_is_its_largest_angle() -> None:
+    """Off course by an angle between none and reversal: cosines of hand-weighted twists."""
+    # Achieved (0.4, 0.5, 1), weighted (0.4, 0.5, 0.2); wanted the translation alone.
+    trace = _trace([1.0, 1.0], [[0.4, 0.5, 0.0], [0.4, 0.5, 1.0]], [Status.OK, Status.STUCK])
+    got = evaluate(recompute(trace, _scenario()))
+    assert got["off_course_max_rad"] == pytest.approx(math.acos(math.sqrt(0.41 / 0.45)))
+    assert got["progress_min"] == pytest.approx(1.0)
+    assert got["stuck_share"] == 0.5
+
+
+def test_the_smallest_singular_value_is_that_of_the_worst_configuration() -> None:
+    """Stretched, the planar arm's is zero, at the last configuration too."""
+    trace = _trace([0.0], [[1.0, 0, 0]], [Status.OK])
+    trace.q[-1] = 0.0
+    assert evaluate(recompute(trace, _scenario()))["sigma_min"] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_limits_that_are_not_in_force_are_not_violated() -> None:
+    """Zero, and a ratio that is not defined; the shares of violating steps are zero."""
+    scenario = _scenario()
+    bare = scenario.robot.with_limits(position=None, velocity=None, acceleration=None)
+    trace = _trace([1.0, -2.0], [[0.4, 0.5, 1.0]] * 2, [Status.OK] * 2)
+    got = evaluate(recompute(trace, replace(scenario, robot=bare)))
+    assert got["position_violation_max_rad"] == 0.0
+    assert got["velocity_violation_max_rad_s"] == 0.0
+    assert got["acceleration_violation_max_rad_s2"] == 0.0
+    assert got["violating_share"] == 0.0
+    assert math.isnan(got["velocity_peak_ratio"])
+
+
+def test_infinite_limits_are_not_violated() -> None:
+    """Nor do they turn a ratio into NaN."""
+    scenario = _scenario()
+    far = scenario.robot.with_limits(position=np.inf, velocity=[np.inf, 1, 1], acceleration=np.inf)
+    trace = _trace([1.0, -2.0], [[0.4, 0.5, 1.0]] * 2, [Status.OK] * 2)
+    got = evaluate(recompute(trace, replace(scenario, robot=far)))
+    assert got["violating_share"] == 0.0
+    assert got["velocity_peak_ratio"] == 0.0
+    assert got["acceleration_violation_max_rad_s2"] == 0.0
+
+
+def test_a_one_sided_velocity_limit_is_a_ratio_on_its_side() -> None:
+    """A joint that may only move forward, and does, at half its limit."""
+    scenario = _scenario()
+    forward = scenario.robot.with_limits(velocity=([0, -1, -1], 2.0))
+    trace = _trace([1.0], [[0.4, 0.5, 1.0]], [Status.OK])
+    got = evaluate(recompute(trace, replace(scenario, robot=forward)))
+    assert got["velocity_peak_ratio"] == pytest.approx(0.5)
+    assert got["velocity_violation_max_rad_s"] == 0.0
+
+
+def test_rounding_is_not_a_violation() -> None:
+    """A limit passed by 1e-12 does not make a step violate it; by 1e-6 it does."""
+    scenario = _scenario()
+    for excess, share in ((1e-12, 0.0), (1e-6, 1.0)):
+        limit = scenario.robot.with_limits(position=5.0, velocity=1.0 - excess)
+        trace = _trace([1.0], [[0.4, 0.5, 1.0]], [Status.OK])
+        got = evaluate(recompute(trace, replace(scenario, robot=limit)))
+        assert got["violating_share"] == share
+
+
+def test_a_start_outside_a_limit_is_not_a_step_that_violates_it() -> None:
+    """A step answers for where it ends."""
+    scenario = _scenario()
+    limit = scenario.robot.with_limits(position=([0.05, -2, -2], 2.0), velocity=2.0)
+    trace = _trace([1.0], [[0.4, 0.5, 1.0]], [Status.OK])
+    got = evaluate(recompute(trace, replace(scenario, robot=limit)))
+    assert got["violating_share"] == 0.0
+    assert got["position_violation_max_rad"] == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize("name", METRICS)
+def test_one_step_defines_every_metric(name: str) -> None:
+    """The shortest run that there is."""
+    trace = _trace([1.0], [[0.4, 0.5, 1.0]], [Status.OK])
+    assert math.isfinite(evaluate(recompute(trace, _scenario()))[name])
+
+
+def test_no_step_leaves_what_it_cannot_define() -> None:
+    """A trial that ended at step 0: errors at the start, no travel, NaN for shares and progress."""
+    trace = _trace([], [], [])
+    got = evaluate(recompute(trace, _scenario()))
+    assert list(got) == list(METRICS)
+    for name, value in got.items():
+        defined = "error" in name or name in {
+            "joint_travel_rad", "sigma_min", "position_violation_max_rad"
+        }  # fmt: skip
+        assert math.isnan(value) != defined, name
+    assert got["position_error_max_m"] == pytest.approx(0.0, abs=1e-12)
+    assert got["joint_travel_rad"] == 0.0
+
+
+def test_a_run_that_only_dwells_has_no_progress() -> None:
+    """Nothing was wanted at any step: NaN, and no warning about empty means."""
+    trace = _trace([0.0, 0.0], [[0.0, 0.0, 0.0]] * 2, [Status.OK] * 2)
+    got = evaluate(recompute(trace, _scenario()))
+    assert math.isnan(got["progress_mean"])
+    assert math.isnan(got["progress_min"])
+    assert math.isnan(got["off_course_max_rad"])
+
+
+def test_a_run_that_stands_still_makes_no_progress() -> None:
+    """Progress 0, no direction: stopped is not on course."""
+    trace = _trace([0.0, 0.0], [[0.4, 0.5, 1.0]] * 2, [Status.STUCK] * 2)
+    got = evaluate(recompute(trace, _scenario()))
+    assert got["progress_mean"] == 0.0
+    assert math.isnan(got["off_course_max_rad"])
+    assert got["stuck_share"] == 1.0
+
+
+@pytest.mark.parametrize("name", METRICS)
+def test_metrics_say_what_they_are(name: str) -> None:
+    """A unit that is the name's end, a direction, a worst value on its side, one line."""
+    metric = METRICS[name]
+    assert metric.name == name
+    assert "\n" not in metric.definition
+    units = {"m": "_m", "rad": "_rad", "rad/s": "_rad_s", "rad/s^2": "_rad_s2", "": ""}
+    assert name.endswith(units[metric.unit])
+    value = _four_steps()[name]
+    assert metric.worst >= value if metric.best == "low" else metric.worst <= value

@@ -1,0 +1,210 @@
+"""A run from the plan to the report, in real worker processes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from dikbench.metrics import METRICS
+from dikbench.report.page import write_report
+from dikbench.run.runner import run_study, run_trials
+from dikbench.study import Selection, expand, load_study, select
+from dikbench.trace import Trace
+
+HOSTILE = '''
+import os, signal
+from dataclasses import dataclass
+import numpy as np
+
+@dataclass(frozen=True)
+class Hostile:
+    """Does what a law must not."""
+
+    how: str = "raise"
+
+    def velocity(self, problem, solve):
+        if self.how == "raise":
+            raise RuntimeError("first line\\nsecond line")
+        if self.how == "exit":
+            os._exit(3)
+        if self.how == "crash":
+            os.kill(os.getpid(), signal.SIGSEGV)
+        if self.how == "nan":
+            return np.full(problem.robot.nv, np.nan)
+        if self.how == "shape":
+            return np.zeros(problem.robot.nv + 1)
+        return 1e9 * np.ones(problem.robot.nv)
+'''
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a small run with every kind of law, a skipped pair and a path-indexed run."""
+    out = tmp_path_factory.mktemp("run") / "out"
+    selection = Selection(
+        scenarios=("reach", "near-miss[miss=0.02]"), references=("time", "path"), seeds=(0, 1)
+    )
+    run_study(select(load_study("smoke"), selection, named=True), out, 2, "a test")
+    write_report(out)
+    return out
+
+
+def test_every_planned_trial_has_its_row(results: Path) -> None:
+    """The table has one row per trial of the plan, no more, and the columns of the issue."""
+    trials = pd.read_csv(results / "trials.csv")
+    keys = ["formulation", "solver", "scenario", "plant", "reference", "seed"]
+    assert not trials.duplicated(keys).any()
+    assert len(trials) == 9 * 2 * 2 * 2 * 2
+    assert {*keys, "status", *METRICS, "law_time_median_us", "law_time_p99_us"} <= {*trials.columns}
+
+
+def test_cells_that_cannot_work_are_rows_that_say_why(results: Path) -> None:
+    """An LP through proxqp, and a path-indexed run without a path, are skipped with a reason."""
+    trials = pd.read_csv(results / "trials.csv")
+    skipped = trials[trials["status"] == "skipped"]
+    no_path = skipped[skipped["solver"] != "proxqp"]
+    assert (no_path["scenario"] == "reach").all()
+    assert (no_path["reference"] == "path").all()
+    assert skipped["message"].str.len().gt(10).all()
+    assert set(trials["status"]) == {"ok", "skipped"}
+
+
+def test_times_are_of_the_law_and_not_of_a_trial(results: Path) -> None:
+    """Times belong to formulation, solver and scenario; solving is part of the law's time."""
+    trials = pd.read_csv(results / "trials.csv")
+    ran = trials[(trials["status"] == "ok") & (trials["seed"] == 0)]
+    per_cell = ran.groupby(["formulation", "solver", "scenario"])["law_time_median_us"]
+    assert per_cell.nunique().eq(1).all()
+    assert (ran["solve_time_median_us"] <= ran["law_time_median_us"]).all()
+    assert (ran[ran["solver"] == "none"]["solve_time_median_us"] == 0).all()
+
+
+def test_tables_figures_and_manifest_are_written(results: Path) -> None:
+    """The files that the README promises are there and hold something."""
+    for name in ("tracking_error", "limit_violation", "timing"):
+        assert len(pd.read_csv(results / "tables" / f"{name}.csv")) > 5
+        assert (results / "tables" / f"{name}.md").read_text().startswith("# ")
+    figures = {path.name for path in (results / "figures").glob("*.svg")}
+    assert {
+        "error_and_speed_against_time.svg",
+        "off_course_against_progress.svg",
+        "time_per_law_and_solver.svg",
+    } <= figures
+    manifest = json.loads((results / "manifest.json").read_text())
+    assert manifest["study"]["name"] == "smoke"
+    assert {"daqp", "osqp", "clarabel"} <= set(manifest["solvers"])
+    report = (results / "report.md").read_text()
+    for name in figures:
+        assert name in report
+    assert "proxqp cannot take a linear program" in report
+
+
+def test_a_table_is_what_the_trials_say(results: Path) -> None:
+    """Numbers of the tables are recomputed here from trials.csv, by other means."""
+    trials = pd.read_csv(results / "trials.csv")
+    chosen = trials[
+        (trials["formulation"] == "dls")
+        & (trials["plant"] == "ideal")
+        & (trials["status"] == "ok")
+        & trials["scenario"].str.startswith("near-miss")
+    ]
+    table = pd.read_csv(results / "tables" / "tracking_error.csv")
+    row = table[
+        (table["family"] == "near-miss")
+        & (table["formulation"] == "dls")
+        & (table["plant"] == "ideal")
+    ].iloc[0]
+    values = sorted(chosen["position_error_rms_m"])
+    assert row["trials"] == len(values) == 4
+    assert row["position rms median [m]"] == pytest.approx((values[1] + values[2]) / 2)
+    assert row["position worst [m]"] == pytest.approx(max(chosen["position_error_max_m"]))
+
+
+def test_seeds_differ_and_a_path_indexed_run_waits(results: Path) -> None:
+    """Another seed is another run, and a scaling law tracks better when the reference waits."""
+    trials = pd.read_csv(results / "trials.csv")
+    lp = trials[
+        (trials["formulation"] == "lp-alpha")
+        & (trials["solver"] == "daqp")
+        & (trials["plant"] == "ideal")
+        & trials["scenario"].str.startswith("near-miss")
+    ].set_index(["reference", "seed"])
+    assert lp.loc[("time", 0), "progress_min"] != lp.loc[("time", 1), "progress_min"]
+    errors = lp["position_error_max_m"]
+    assert errors["path", 0] < 0.2 * errors["time", 0]
+    assert lp["steps"]["path", 0] > lp["steps"]["time", 0]
+
+
+def test_a_run_is_the_same_with_one_worker_and_with_two(tmp_path: Path) -> None:
+    """Every column but the times is bit-equal whatever the number of workers."""
+    selection = Selection(scenarios=("near-miss[miss=0.02]",), plants=("ideal",))
+    planned = expand(select(load_study("smoke"), selection, named=True))
+    tables = []
+    for jobs in (1, 2):
+        folder = tmp_path / str(jobs)
+        folder.mkdir()
+        tables.append(pd.DataFrame(run_trials(planned, folder, jobs)))
+    pd.testing.assert_frame_equal(*tables, check_exact=True)
+    names = sorted(path.name for path in (tmp_path / "1").glob("*.npz"))
+    assert names == sorted(path.name for path in (tmp_path / "2").glob("*.npz"))
+    for name in names:
+        one, two = (Trace.load(tmp_path / jobs / name) for jobs in ("1", "2"))
+        np.testing.assert_array_equal(one.applied, two.applied)
+
+
+@pytest.mark.parametrize(
+    ("how", "status", "message"),
+    [
+        ("raise", "formulation-error", "step 0: RuntimeError: first line"),
+        ("exit", "crashed", "exit code"),
+        ("crash", "crashed", "exit code"),
+        ("nan", "not-finite", "step 0"),
+        ("shape", "wrong-shape", "step 0: expected (7,), got (8,)"),
+        ("diverge", "diverged", "step 0"),
+    ],
+)
+def test_a_hostile_law_ends_as_a_row_and_the_run_goes_on(
+    tmp_path: Path,
+    how: str,
+    status: str,
+    message: str,
+    write: Callable[[Path], str],
+) -> None:
+    """Whatever a law does, its trial is a row with its status and the others are untouched."""
+    law = write(tmp_path)
+    selection = Selection(
+        formulations=(f"{law}[how={how}]", "dls"), scenarios=("reach",), plants=("ideal",)
+    )
+    planned = expand(select(load_study("smoke"), selection, named=False))
+    bad, good = run_trials(planned, tmp_path, 1)
+    assert bad["status"] == status
+    assert message in bad["message"]
+    assert good["status"] == "ok"
+    assert good["position_error_final_m"] < 0.01
+
+
+@pytest.fixture
+def write() -> Callable[[Path], str]:
+    """A function that writes the hostile law and returns its selector's name."""
+
+    def to(folder: Path) -> str:
+        path = folder / "hostile.py"
+        path.write_text(HOSTILE)
+        return f"{path}:Hostile"
+
+    return to
+
+
+def test_a_report_of_nothing_but_skipped_cells_is_made(tmp_path: Path) -> None:
+    """A run in which no cell could work still ends with tables and a report that says why."""
+    selection = Selection(
+        formulations=("lp-alpha",), solvers=("proxqp",), scenarios=("reach",), plants=("ideal",)
+    )
+    run_study(select(load_study("smoke"), selection, named=False), tmp_path / "out", 1, "a test")
+    write_report(tmp_path / "out")
+    assert "1 cells skipped" in (tmp_path / "out" / "report.md").read_text()
