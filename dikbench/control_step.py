@@ -7,6 +7,7 @@ from time import perf_counter_ns
 import numpy as np
 
 from dikbench.array import Array
+from dikbench.box import velocity_box
 from dikbench.errors import CannotAnswer, Infeasible
 from dikbench.problem import DikProblem, Formulation
 from dikbench.solvers.checked import CheckedSolve
@@ -44,7 +45,7 @@ def control_step(formulation: Formulation, problem: DikProblem, solve: CheckedSo
 
     Raises:
         TrialEnded: if the law raises anything but `CannotAnswer`, or returns what is not a finite
-            vector (nv,).
+            vector (nv,) of real numbers.
     """
     solve.begin_step()
     start = perf_counter_ns()
@@ -54,6 +55,8 @@ def control_step(formulation: Formulation, problem: DikProblem, solve: CheckedSo
         law_ns = perf_counter_ns() - start - solve.checking_ns
         status = Status.INFEASIBLE if isinstance(error, Infeasible) else Status.SOLVER_FAILED
         return Outcome(fallback(problem), status, law_ns)
+    except MemoryError as error:
+        raise TrialEnded(Status.OUT_OF_MEMORY, f"{type(error).__name__}: {error}") from error
     except Exception as error:
         message = str(error).strip().partition("\n")[0]
         raise TrialEnded(Status.FORMULATION_ERROR, f"{type(error).__name__}: {message}") from error
@@ -61,6 +64,8 @@ def control_step(formulation: Formulation, problem: DikProblem, solve: CheckedSo
     if not isinstance(v, np.ndarray) or v.shape != (problem.robot.nv,):
         shape = getattr(v, "shape", type(v).__name__)
         raise TrialEnded(Status.WRONG_SHAPE, f"expected ({problem.robot.nv},), got {shape}")
+    if v.dtype.kind not in "fiu":
+        raise TrialEnded(Status.WRONG_SHAPE, f"expected real numbers, got {v.dtype}")
     if not np.isfinite(v).all():
         raise TrialEnded(Status.NOT_FINITE, f"velocity {v.tolist()}")
     return Outcome(v, Status.OK if solve.verified else Status.NOT_VERIFIED, law_ns)
@@ -73,12 +78,12 @@ def fallback(problem: DikProblem) -> Array:
     1 - min_i a_i dt / |v_prev,i|; without acceleration limits, or without v_prev, the robot stops
     at once (outside a position limit the box then asks for the way back).
     """
-    box = problem.box()
+    box = velocity_box(problem.limits, problem.v_prev, problem.dt)  # not recorded as the law's
     v = np.zeros(problem.robot.nv)
     acceleration = problem.limits.joint.acceleration
     if problem.v_prev is not None and acceleration is not None:
         slow = np.where(problem.v_prev > 0, -acceleration.lower, acceleration.upper) * problem.dt
-        moving = np.abs(problem.v_prev) > 0
-        shares = slow[moving] / np.abs(problem.v_prev[moving])
-        v = max(0.0, 1.0 - float(shares.min(initial=1.0))) * problem.v_prev
+        speed = np.abs(problem.v_prev)
+        fast = speed > slow  # the others can stop in one step
+        v = float(np.max(1.0 - slow[fast] / speed[fast], initial=0.0)) * problem.v_prev
     return np.clip(v, box.lower, box.upper)

@@ -26,7 +26,10 @@ class Interval:
         """Values (..., nv) over the bound on their own side; infinite past a bound of zero."""
         bound = np.abs(np.where(values > 0, self.upper, self.lower))
         with np.errstate(divide="ignore"):
-            return np.divide(np.abs(values), bound, out=np.zeros_like(values), where=values != 0)
+            share: Array = np.divide(
+                np.abs(values), bound, out=np.zeros_like(values), where=values != 0
+            )
+        return share
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ import pinocchio as pin
 from dikbench.array import Array
 from dikbench.limits import Interval
 from dikbench.motion import Motion
-from dikbench.progress import off_course, progress, row_weights
+from dikbench.progress import STUCK_PROGRESS, off_course, progress, row_weights
 from dikbench.status import Status
 
 Table = Literal["tracking error", "limit violation"]
@@ -122,6 +122,11 @@ def _travel(motion: Motion) -> float:
     return float(np.sum(steps))
 
 
+def _stuck_share(motion: Motion) -> float:
+    alpha = _progress(motion)
+    return float(np.mean(alpha < STUCK_PROGRESS)) if len(alpha) else float("nan")
+
+
 def _share(status: Status) -> Callable[[Motion], float]:
     return lambda motion: motion.trace.share(status)
 
@@ -222,9 +227,18 @@ METRICS: Mapping[str, Metric] = MappingProxyType(
                 _share(Status.NOT_VERIFIED),
             ),
             Metric(
+                "optimum_distance_max_rad_s",
+                "rad/s",
+                "low",
+                _INF,
+                "limit violation",
+                "largest distance of a solver's answer from the optimum (alpha scaling: in alpha)",
+                lambda m: _largest(m.trace.distance),
+            ),
+            Metric(
                 "stuck_share", "", "low", 1.0, "tracking error",
-                "share of the steps that made less than 1 % of the wanted motion",
-                _share(Status.STUCK),
+                "share of the steps with something wanted that made less than 1 % of it",
+                _stuck_share,
             ),
             Metric(
                 "relaxed_share", "", "low", 1.0, "limit violation",

@@ -14,10 +14,9 @@ from dikbench.control_step import TrialEnded, control_step
 from dikbench.errors import DikbenchError, unknown
 from dikbench.kinematics import Kinematics
 from dikbench.problem import DikProblem, Formulation, program_of
-from dikbench.progress import progress, row_weights
+from dikbench.progress import STUCK_PROGRESS, progress, row_weights
 from dikbench.registry import make_formulation
 from dikbench.robot import Robot, checked_vector
-from dikbench.simulation import STUCK_PROGRESS
 from dikbench.solvers.catalogue import DEFAULT_SOLVER, parse_solver, why_not
 from dikbench.solvers.checked import make_solve
 from dikbench.status import Status
@@ -61,8 +60,8 @@ def solve_dik(
 ) -> DikAnswer:
     """Compute the joint velocity of one control step.
 
-    Where q is outside a position limit, laws that keep the limits ask for the way back at a tenth
-    of the velocity limit, or answer by the fallback that does (status `infeasible`).
+    Where q is outside a position limit, laws that keep the limits ask for the way back, at most at
+    a tenth of the velocity limit, or answer by the fallback that does (status `infeasible`).
 
     Args:
         robot: the robot, with the limits that are in force.
@@ -85,6 +84,8 @@ def solve_dik(
     law = make_formulation(formulation) if isinstance(formulation, str) else formulation
     if not np.isfinite(dt) or dt <= 0:
         raise DikbenchError(f"dt: expected a positive number of seconds, got {dt!r}")
+    if reference_frame not in REFERENCE_FRAMES:
+        raise unknown("reference_frame", reference_frame, REFERENCE_FRAMES)
     configuration = robot.configuration(q)
     previous = None if v_prev is None else checked_vector(v_prev, robot.nv, "v_prev")
     kinematics = Kinematics(robot)
@@ -132,8 +133,6 @@ def _solve_for(law: Formulation, selector: str | None) -> Any:
 
 def _twist_task(kinematics: Kinematics, twist: object, reference_frame: str) -> LinearizedTask:
     """The task J v = V for a twist that is given in the axes of a reference frame."""
-    if reference_frame not in REFERENCE_FRAMES:
-        raise unknown("reference_frame", reference_frame, REFERENCE_FRAMES)
     robot = kinematics.robot
     V = checked_vector(twist, 6, "twist")
     X = kinematics.placement(robot.frame_id)

@@ -14,6 +14,7 @@ from dikbench.errors import DikbenchError
 from dikbench.kinematics import Kinematics, smallest_singular_value
 from dikbench.references import Reference
 from dikbench.robot import Robot
+from dikbench.steps import steps_in
 
 
 def solve_placement(robot: Robot, target: Any, seed: Array, *, iterations: int = 200) -> Array:
@@ -32,17 +33,15 @@ def solve_placement(robot: Robot, target: Any, seed: Array, *, iterations: int =
     for _ in range(iterations):
         kinematics.update(q)
         e = pin.log6(kinematics.placement(robot.frame_id).actInv(target)).np[rows]
-        error = float(np.linalg.norm(e))
-        if error < 1e-12:
-            return q
+        before, error = error, float(np.linalg.norm(e))
+        if error < 1e-12 or (error < 1e-9 and error >= before):
+            return q  # there, or as near as rounding lets it come
         J = kinematics.jacobian(robot.frame_id)[rows]
         H = J.T @ J
         H.flat[:: len(H) + 1] += 0.1 * error**2 + 1e-12
         step = np.linalg.solve(H, J.T @ e)
         largest = float(np.abs(step).max())
         q = pin.integrate(robot.model, q, step * min(1.0, 0.3 / max(largest, 1e-300)))
-    if error < 1e-9:
-        return q
     raise DikbenchError(
         f"robot {robot.name}: no posture found for the placement, residual {error:.2g}"
     )
@@ -83,7 +82,7 @@ def oracle_motion(
     Raises:
         DikbenchError: if a sample cannot be reached.
     """
-    count = max(1, round(reference.duration / dt))
+    count = steps_in(reference.duration, dt)
     q = [q0]
     for k in range(1, count + 1):
         if seeds is not None:

@@ -14,6 +14,9 @@ CHARACTERISTIC_LENGTH: Final = 0.2
 DWELL: Final = 1e-4
 """Below this |V|_M [m/s] nothing is wanted: the step is a dwell and has no direction."""
 
+STUCK_PROGRESS: Final = 0.01
+"""A step that makes less than this share of the wanted motion is stuck."""
+
 STOPPED: Final = 1e-6
 """Below this share of |V|_M the robot stands still: stopped, not on course."""
 

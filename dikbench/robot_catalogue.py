@@ -117,7 +117,7 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
             summary="a planar arm of three links (0.4, 0.3, 0.2 m), built in code",
             model=lambda: planar_arm((0.4, 0.3, 0.2), velocity_limit=2.0),
             frame="tip",
-            start=(0.4, 0.8, 0.7),
+            start=(0.3, 1.6, 0.6),
             acceleration=(10.0, 10.0, 10.0),
             acceleration_source="chosen for this arm, which exists in code only",
             task_rows=(0, 1, 5),

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 
 from dikbench.array import Array
 from dikbench.certificate import Certificate
-from dikbench.errors import DikbenchError
 from dikbench.references import Reference
 from dikbench.robot import Robot
+from dikbench.steps import steps_in
 from dikbench.tasks.task import Task
-
-MOST_STEPS = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,18 +40,10 @@ class Scenario:
     tasks: tuple[Task, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check that a run is of a size that ends.
-
-        Raises:
-            DikbenchError: if it is not.
-        """
-        if not 1 <= self.duration / self.dt <= MOST_STEPS:
-            raise DikbenchError(
-                f"a run of {self.duration:g} s at dt = {self.dt:g} s has "
-                f"{self.duration / self.dt:.3g} steps; valid: 1 to {MOST_STEPS}"
-            )
+        """Check that a run ends (see `steps_in`)."""
+        steps_in(self.duration, self.dt)
 
     @property
     def steps(self) -> int:
         """Number of control steps of a time-indexed run."""
-        return max(1, round(self.duration / self.dt))
+        return steps_in(self.duration, self.dt)

@@ -13,7 +13,7 @@ from dikbench.control_step import TrialEnded, control_step
 from dikbench.kinematics import Kinematics
 from dikbench.plants import Plant
 from dikbench.problem import DikProblem, Formulation
-from dikbench.progress import progress, row_weights
+from dikbench.progress import STUCK_PROGRESS, progress, row_weights
 from dikbench.scenario import Scenario
 from dikbench.solvers.checked import CheckedSolve
 from dikbench.status import STEP_CODE, Status
@@ -31,8 +31,8 @@ FASTEST = 1e6
 FARTHEST = 100.0
 """A task error above this (m, rad) means that the run has diverged."""
 
-STUCK_PROGRESS = 0.01
-"""A step that makes less than this share of the wanted motion is stuck."""
+ROUNDING = 1e-9
+"""A path is at its end when this share of it is left."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +63,7 @@ class _Recorder:
         self.applied = np.empty((n, nv))
         self.status = np.zeros(n, dtype=int)
         self.relaxed = np.zeros(n, dtype=int)
-        self.residuals = np.zeros((n, 3))
+        self.residuals = np.zeros((n, 4))
 
     def trace(self, scenario: Scenario, n: int) -> Trace:
         """The trace of the first n steps; steps that went nowhere become `stuck`."""
@@ -73,7 +73,7 @@ class _Recorder:
         status[(status == STEP_CODE[Status.OK]) & (alpha < STUCK_PROGRESS)] = STEP_CODE[
             Status.STUCK
         ]
-        primal, dual, gap = self.residuals[:n].T
+        primal, dual, gap, distance = self.residuals[:n].T
         return Trace(
             scenario.dt,
             self.q[: n + 1],
@@ -86,6 +86,7 @@ class _Recorder:
             primal.copy(),
             dual.copy(),
             gap.copy(),
+            distance.copy(),
         )
 
 
@@ -121,7 +122,7 @@ def simulate(
             if targets is not None:
                 tau = k * dt
                 target, twist = targets[k]
-            elif tau >= reference.duration:
+            elif tau >= reference.duration * (1 - ROUNDING):
                 break
             else:
                 target, twist = reference.placement(tau), reference.velocity(tau)
@@ -142,10 +143,11 @@ def simulate(
             record.commanded[k], record.applied[k] = v, applied
             record.status[k] = STEP_CODE[outcome.status]
             record.relaxed[k] = problem.relaxed
-            record.residuals[k] = solve.primal, solve.dual, solve.gap
+            record.residuals[k] = solve.primal, solve.dual, solve.gap, solve.distance
             if targets is None:
                 alpha = progress(task.V[None], (task.J @ applied)[None], rows)[0]
                 tau += dt * (1.0 if np.isnan(alpha) else min(max(float(alpha), 0.0), 1.0))
+                tau = min(tau, reference.duration)
             q = pin.integrate(model, q, applied * dt)
             v_prev = applied
         else:

@@ -25,7 +25,8 @@ class Trace:
         applied: what the plant made of it, (n, nv) [rad/s].
         status: codes of `STEP_STATUSES`, (n,).
         relaxed: joints whose acceleration bound was given up, (n,).
-        primal, dual, gap: largest residuals of the step's programs, (n,) [rad/s].
+        primal, dual, gap: largest residuals of the step's programs, (n,) (see `Residuals`).
+        distance: their largest distance from the optimum, (n,) [rad/s].
     """
 
     dt: float
@@ -39,6 +40,7 @@ class Trace:
     primal: Array
     dual: Array
     gap: Array
+    distance: Array
 
     @property
     def steps(self) -> int:

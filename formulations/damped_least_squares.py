@@ -19,7 +19,8 @@ class DampedLeastSquares:
         min ||J v - V||^2 + lambda^2 ||v||^2,   v = J^T (J J^T + lambda^2 I)^-1 V
 
     J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s. Bounded by
-    ||V|| / (2 lambda), never exact, and knows no limits.
+    ||V|| / (2 lambda), never exact, and knows no limits;
+    weights play no part.
 
     Attributes:
         damping: lambda, unsquared (units of J); 0.01-0.05 in the recent literature.
@@ -32,8 +33,8 @@ class DampedLeastSquares:
 
     def __post_init__(self) -> None:
         """Check the parameters."""
-        if not self.damping >= 0:
-            raise DikbenchError("dls: damping must be at least 0")
+        if not 0 <= self.damping < np.inf:
+            raise DikbenchError("dls: damping must be finite and at least 0")
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
@@ -42,7 +43,7 @@ class DampedLeastSquares:
         damped = J @ J.T
         damped.flat[:: len(damped) + 1] += self.damping**2
         y = solve_positive_definite(damped, task.V)
-        if y is None:  # only without damping, at an exact singularity
+        if y is None:  # (almost) no damping, at a singularity
             v: Array = pseudo_inverse(J, np.finfo(float).eps) @ task.V
             return v
         return J.T @ y

@@ -24,8 +24,9 @@ class LpAlpha:
 
     J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s. A linear program
     where rho = 0; its vertices are not unique where the arm has a null space and v then chatters,
-    which a small rho cures. Never off course and inside every limit; slows down, and stops where
-    the wanted direction is lost.
+    which a small rho cures. Never off course and inside every limit; slows down, and where the
+    wanted direction is lost the frame stops (with rho = 0 the joints need not: alpha = 0 leaves the
+    null space of a singular J free). Weights play no part.
 
     Attributes:
         regularization: rho; None: 1e-4 if the arm has more joints than the task has rows, else 0.
@@ -42,8 +43,8 @@ class LpAlpha:
 
     def __post_init__(self) -> None:
         """Check the parameters."""
-        if self.regularization is not None and not self.regularization >= 0:
-            raise DikbenchError("lp-alpha: regularization must be at least 0")
+        if self.regularization is not None and not 0 <= self.regularization < np.inf:
+            raise DikbenchError("lp-alpha: regularization must be finite and at least 0")
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, ClassVar
 
+import numpy as np
+
 from dikbench.array import Array
 from dikbench.box import Braking
 from dikbench.errors import DikbenchError
@@ -40,39 +42,47 @@ class LpAlphaCvxpy:
 
     def __post_init__(self) -> None:
         """Check the parameters."""
-        if self.regularization is not None and not self.regularization >= 0:
-            raise DikbenchError("lp-alpha-cvxpy: regularization must be at least 0")
+        if self.regularization is not None and not 0 <= self.regularization < np.inf:
+            raise DikbenchError("lp-alpha-cvxpy: regularization must be finite and at least 0")
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
         task = problem.primary
         rho = regularization_for(task, self.regularization)
         box = problem.box(self.braking)
-        model, unknowns, given = _compiled(*task.J.shape, rho)
-        given["J"].value, given["V"].value = task.J, task.V
-        given["lo"].value, given["hi"].value = box.lower, box.upper
+        below, above = (tuple(map(bool, np.isfinite(side))) for side in (box.lower, box.upper))
+        model, unknowns, given = _compiled(len(task.V), below, above, rho)
+        values = {
+            "J": task.J,
+            "V": task.V,
+            "lo": box.lower[list(below)],
+            "hi": box.upper[list(above)],
+        }
+        for name, parameter in given.items():
+            parameter.value = values[name]
         x = solve(ModelledProgram(model, unknowns, lambda: alpha_program(task, box, rho)))
         return x[: problem.robot.nv]
 
 
 @lru_cache(maxsize=32)
-def _compiled(m: int, n: int, rho: float) -> tuple[Any, tuple[Any, Any], dict[str, Any]]:
-    """The model for a task of m rows and an arm of n joints, its unknowns and its parameters."""
-    import cvxpy
+def _compiled(
+    m: int, below: tuple[bool, ...], above: tuple[bool, ...], rho: float
+) -> tuple[Any, tuple[Any, Any], dict[str, Any]]:
+    """The model for a task of m rows, its unknowns and its parameters.
 
+    `below` and `above` say, joint by joint, which velocities are bounded at all.
+    """
+    import cvxpy  # costs a second, and only this law needs it
+
+    n = len(below)
     v, alpha = cvxpy.Variable(n), cvxpy.Variable()
-    given = {
-        "J": cvxpy.Parameter((m, n)),
-        "V": cvxpy.Parameter(m),
-        "lo": cvxpy.Parameter(n),
-        "hi": cvxpy.Parameter(n),
-    }
+    given = {"J": cvxpy.Parameter((m, n)), "V": cvxpy.Parameter(m)}
+    constraints = [given["J"] @ v == alpha * given["V"], alpha >= 0, alpha <= 1]
+    if any(below):
+        given["lo"] = cvxpy.Parameter(sum(below))
+        constraints.append(v[np.flatnonzero(below)] >= given["lo"])
+    if any(above):
+        given["hi"] = cvxpy.Parameter(sum(above))
+        constraints.append(v[np.flatnonzero(above)] <= given["hi"])
     objective = alpha - rho / 2 * cvxpy.sum_squares(v) if rho > 0 else alpha
-    constraints = [
-        given["J"] @ v == alpha * given["V"],
-        alpha >= 0,
-        alpha <= 1,
-        v >= given["lo"],
-        v <= given["hi"],
-    ]
     return cvxpy.Problem(cvxpy.Maximize(objective), constraints), (v, alpha), given

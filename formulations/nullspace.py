@@ -22,7 +22,7 @@ class Nullspace:
 
     over the priority levels k = 1, 2, ...; J_k (m_k, nv) and V_k (m_k,) are level k's, poses in the
     task frame; v in rad/s. Protects the first task exactly and knows no limits; singular wherever
-    a task is, or where two tasks become dependent.
+    a task is, or where two tasks become dependent. Weights play no part.
 
     Attributes:
         rank_tolerance: singular values of J_k N_(k-1) up to this count as zero (absolute, units of
@@ -36,8 +36,8 @@ class Nullspace:
 
     def __post_init__(self) -> None:
         """Check the parameters."""
-        if self.rank_tolerance < 0:
-            raise DikbenchError("nullspace: rank_tolerance must be at least 0")
+        if not 0 <= self.rank_tolerance < np.inf:
+            raise DikbenchError("nullspace: rank_tolerance must be finite and at least 0")
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

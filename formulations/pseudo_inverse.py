@@ -23,6 +23,7 @@ class PseudoInverse:
 
     J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s. Exact where the task
     is feasible, unbounded near a singularity; clipping leaves the course, scaling slows down.
+    Weights play no part.
 
     Attributes:
         after: what to do with a velocity outside the limits.
@@ -36,8 +37,8 @@ class PseudoInverse:
 
     def __post_init__(self) -> None:
         """Check the parameters."""
-        if self.rank_tolerance < 0:
-            raise DikbenchError("pinv: rank_tolerance must be at least 0")
+        if not 0 <= self.rank_tolerance < np.inf:
+            raise DikbenchError("pinv: rank_tolerance must be finite and at least 0")
 
     @property
     def keeps(self) -> frozenset[LimitKind]:

@@ -22,9 +22,9 @@ class WeightedQp:
         s.t.   lo <= v <= hi   (the velocity box: position, velocity and acceleration limits)
 
     over all tasks i, with W_i the task's weights (priorities play no part); poses in the task
-    frame; v in rad/s. With no bound active and one task it is damped least squares. With
-    `log_derivative` both sides of a pose task are multiplied by Jlog6. Keeps every limit; near a
-    limit or a singularity it leaves the course to do so.
+    frame; v in rad/s. With no bound active, one task and W = I it is damped least squares.
+    With `log_derivative` both sides of a pose task are multiplied by Jlog6. Keeps every limit; near
+    a limit or a singularity it leaves the course to do so.
 
     Attributes:
         damping: lambda, unsquared; not zero by default, else the minimiser is not unique on a
@@ -47,8 +47,8 @@ class WeightedQp:
 
     def __post_init__(self) -> None:
         """Check the parameters."""
-        if not self.damping >= 0:
-            raise DikbenchError("qp: damping must be at least 0")
+        if not 0 <= self.damping < np.inf:
+            raise DikbenchError("qp: damping must be finite and at least 0")
         if not 0 < self.position_gain <= 1:
             raise DikbenchError("qp: position_gain must be in (0, 1]")
 

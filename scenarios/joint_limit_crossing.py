@@ -18,6 +18,7 @@ from dikbench.oracle import measure_motion
 from dikbench.references import joint_path
 from dikbench.robot_catalogue import load_robot
 from dikbench.scenario import Scenario
+from dikbench.steps import steps_in
 from scenarios.common import between, limits_in_force, perturbed, positive, secondary_tasks
 
 
@@ -62,7 +63,7 @@ def joint_limit_crossing(
 
     Args:
         robot: ur5 or panda.
-        approach: how far inside the limit the motion starts [rad].
+        approach: how far inside the limit the motion starts [rad], 0.02 to 3.
         depth: how far beyond the limit it goes [rad], 0.02 to 0.5.
         speed: peak speed of the joint over its limit, 0.05 to 1.
         gain: of the tracking task, 1/s.
@@ -72,7 +73,8 @@ def joint_limit_crossing(
 
     Source: by construction; limits as in Flacco, De Luca & Khatib 2015.
     """
-    positive("joint-limit-crossing", approach=approach, gain=gain, dt=dt)
+    positive("joint-limit-crossing", gain=gain, dt=dt)
+    between("joint-limit-crossing", "approach", approach, 0.02, 3.0)
     between("joint-limit-crossing", "depth", depth, 0.02, 0.5)
     between("joint-limit-crossing", "speed", speed, 0.05, 1.0)
     arm = limits_in_force(load_robot(robot), acceleration=acceleration)
@@ -98,16 +100,15 @@ def joint_limit_crossing(
         v: Array = amplitude * pi / duration * np.sin(2 * pi * tau / duration) * out
         return v
 
-    steps = max(2, round(duration / dt))
-    motion = measure_motion(
-        arm, np.array([q_r(k * duration / steps) for k in range(steps + 1)]), dt
-    )
+    steps = max(2, steps_in(duration, dt))
+    instants = np.linspace(0.0, duration, steps + 1)
+    motion = measure_motion(arm, np.array([q_r(tau) for tau in instants]), duration / steps)
     certificate = Certificate(
         (
-            Claim("position margin at the start [rad]", motion.margin[0], at_least=0.02),
-            Claim("deepest margin of the joint motion [rad]", motion.margin.min(), at_most=-0.02),
+            Claim("position margin at the start [rad]", motion.margin[0], 0.9 * approach),
+            Claim("deepest margin of the motion [rad]", motion.margin.min(), at_most=-0.8 * depth),
             Claim("smallest singular value (m, rad)", motion.sigma_min.min(), at_least=0.03),
-            Claim("required speed over limit", motion.speed_ratio.max(), at_most=1.05),
+            Claim("required speed over limit", motion.speed_ratio.max(), 0.8 * speed, 1.05 * speed),
         )
     )
     return Scenario(

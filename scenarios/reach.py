@@ -36,8 +36,8 @@ def reach(
     """A step to a target nearby: the easy case that every law must pass.
 
     The target is `distance` [m] and `angle` [rad] away from the start, along the body axis
-    (-1, 1, -1)/sqrt(3) and about it (in the plane, for a planar arm). A seed turns the axis and
-    moves the start by up to 0.1 rad per joint.
+    (-1, 1, -1)/sqrt(3) and about it; for a planar arm, along (-1, 1)/sqrt(2) and clockwise. A seed
+    turns the axis and moves the start by up to 0.1 rad per joint.
 
     Args:
         robot: a robot's name, or the path of a URDF.
@@ -61,8 +61,11 @@ def reach(
     axis = np.array([-1.0, 1.0, -1.0])
     if seed:
         axis = np.random.default_rng(seed).normal(size=3)
-    twist = np.concatenate([distance * axis, angle * axis]) / np.linalg.norm(axis)
-    twist[np.setdiff1d(np.arange(6), arm.task_rows)] = 0.0
+    twist = np.zeros(6)
+    rows = list(arm.task_rows)
+    twist[rows] = np.concatenate([axis, axis])[rows]  # only what the arm can move
+    twist[:3] *= distance / np.linalg.norm(twist[:3])
+    twist[3:] *= angle / np.linalg.norm(twist[3:])
     target = start * pin.exp6(pin.Motion(twist))
     # The motion that a gain asks for: straight there, at first at gain times the distance.
     straight = Reference(

@@ -66,4 +66,5 @@ def _speed_ratio(trace: Trace, scenario: Scenario) -> Array:
     limit = scenario.robot.limits.velocity
     if limit is None:
         return np.full(trace.steps, np.nan)
-    return np.maximum(limit.usage(trace.applied).max(axis=1), LEAST)
+    ratio: Array = np.maximum(limit.usage(trace.applied).max(axis=1), LEAST)
+    return ratio

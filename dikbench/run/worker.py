@@ -29,10 +29,11 @@ def scenario_of(selector: str, seed: int) -> Scenario:
     return make_scenario(selector, seed)
 
 
-def solve_of(formulation: str, solver: str) -> CheckedSolve:
+def solve_of(formulation: str, solver: str, *, checks: bool = True) -> CheckedSolve:
     """A fresh `solve` for a law and a solver, both given by their selectors."""
     program = program_of(make_formulation(formulation))
-    return make_solve(None if solver == NO_SOLVER else parse_solver(solver), program)
+    named = None if solver == NO_SOLVER else parse_solver(solver)
+    return make_solve(named, program, checks=checks)
 
 
 def header(trial: Trial) -> Row:

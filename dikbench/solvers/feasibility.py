@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 from scipy.optimize import linprog
 
 from dikbench.quadratic_program import QuadraticProgram
 
+LINPROG_INFEASIBLE: Final = 2
+
 
 def is_feasible(program: QuadraticProgram) -> bool:
-    """Find a feasible point by the simplex method (HiGHS, feasibility tolerance 1e-7)."""
+    """Whether the simplex method does not refute it (HiGHS, feasibility tolerance 1e-7)."""
     n = len(program.q)
     lower = np.full(n, -np.inf) if program.lb is None else program.lb
     upper = np.full(n, np.inf) if program.ub is None else program.ub
@@ -17,8 +21,8 @@ def is_feasible(program: QuadraticProgram) -> bool:
         return False
     G, h = program.G, program.h
     if G is not None and h is not None:
-        finite = np.isfinite(h)  # a relaxed bound constrains nothing
-        G, h = G[finite], h[finite]
+        bounded = h < np.inf  # a relaxed bound constrains nothing
+        G, h = G[bounded], h[bounded]
     result = linprog(
         np.zeros(n),
         A_ub=G,
@@ -28,4 +32,4 @@ def is_feasible(program: QuadraticProgram) -> bool:
         bounds=np.column_stack([lower, upper]),
         method="highs",
     )
-    return bool(result.status == 0)
+    return bool(result.status != LINPROG_INFEASIBLE)

@@ -11,16 +11,17 @@ from dikbench.quadratic_program import QuadraticProgram
 from dikbench.solvers.answer import Answer
 
 VERIFIED_TOLERANCE: Final = 1e-3
-"""An answer is verified if each of its residuals is at most this [rad/s and m/s]."""
+"""The largest residual of a verified answer: primal in rad/s and m/s, dual and gap as scaled."""
 
 
 class Residuals:
-    """Residuals of an answer; x is a velocity, so they are in rad/s (or m/s).
+    """Residuals of an answer.
 
     Attributes:
-        primal: largest violation of an equality, inequality or bound.
+        primal: largest violation of an equality, inequality or bound [rad/s, m/s].
         dual: largest entry of P x + q + G^T z + A^T y + z_box, and largest multiplier of the wrong
-            sign, over max(1, largest entry of P); NaN where the interface gives no multipliers.
+            sign, over max(1, largest entry of P), a gradient of the cost; NaN where the interface
+            gives no multipliers.
         gap: |x^T P x + q^T x + h^T z + b^T y + ub^T z_box+ + lb^T z_box-|, on the same scale.
     """
 
@@ -48,7 +49,7 @@ def residuals(program: QuadraticProgram, answer: Answer) -> Residuals:
     if (
         (program.A is not None and answer.y is None)
         or (program.G is not None and answer.z is None)
-        or (program.lb is not None and answer.z_box is None)
+        or ((program.lb is not None or program.ub is not None) and answer.z_box is None)
     ):
         return Residuals(primal, float("nan"), float("nan"))
     Px = program.P @ x
@@ -63,14 +64,17 @@ def residuals(program: QuadraticProgram, answer: Answer) -> Residuals:
         finite = np.isfinite(program.h)
         gap += float(program.h[finite] @ answer.z[finite])
         wrong_sign = float(np.max(-answer.z, initial=0.0))
-    if program.lb is not None and program.ub is not None and answer.z_box is not None:
+        wrong_sign = max(wrong_sign, float(np.max(np.abs(answer.z[~finite]), initial=0.0)))
+    if answer.z_box is not None and (program.lb is not None or program.ub is not None):
         gradient = gradient + answer.z_box
         for bound, push in (
             (program.ub, np.maximum(answer.z_box, 0.0)),
             (program.lb, np.minimum(answer.z_box, 0.0)),
         ):
-            finite = np.isfinite(bound)
-            gap += float(bound[finite] @ push[finite])
+            finite = np.zeros(len(push), dtype=bool) if bound is None else np.isfinite(bound)
+            if bound is not None:
+                gap += float(bound[finite] @ push[finite])
+            # Nothing can push at a bound that is not there.
             wrong_sign = max(wrong_sign, float(np.max(np.abs(push[~finite]), initial=0.0)))
     scale = max(1.0, float(np.abs(program.P).max()))
     dual = max(float(np.abs(gradient).max()), wrong_sign) / scale

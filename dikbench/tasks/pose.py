@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.array import Array
+from dikbench.errors import DikbenchError
 from dikbench.kinematics import Kinematics
 from dikbench.robot import frame_id
 from dikbench.tasks.task import LinearizedTask
@@ -51,6 +52,10 @@ class PoseTask:
         robot = kinematics.robot
         index = robot.frame_id if self.frame is None else frame_id(robot.model, self.frame)
         X_d = self.target if target is None else target
+        if not isinstance(X_d, pin.SE3):
+            raise DikbenchError(
+                f"pose task: expected a pinocchio.SE3 as target, got {type(X_d).__name__}"
+            )
         relative = kinematics.placement(index).actInv(X_d)
         error: Array = pin.log6(relative).np
         V = self.gain * error

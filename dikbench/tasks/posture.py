@@ -30,9 +30,22 @@ class PostureTask:
     weight: float | Array = 1.0
     priority: int = 2
 
+    def __post_init__(self) -> None:
+        """Check the target."""
+        if not np.isfinite(self.target).all():
+            target = np.asarray(self.target).tolist()
+            raise DikbenchError(f"posture task: expected finite numbers, got {target}")
+
     def linearize(self, kinematics: Kinematics) -> LinearizedTask:
-        """The task at the configuration of `kinematics`."""
+        """The task at the configuration of `kinematics`.
+
+        Raises:
+            DikbenchError: if the target is not an array of the robot's shape (nq,).
+        """
         robot = kinematics.robot
+        shape = getattr(self.target, "shape", type(self.target).__name__)
+        if shape != (robot.nq,):
+            raise DikbenchError(f"posture task: expected shape ({robot.nq},), got {shape}")
         error: Array = pin.difference(robot.model, kinematics.q, self.target)
         return LinearizedTask(
             np.eye(robot.nv), self.gain * error, error, self.weight, self.priority

@@ -270,7 +270,7 @@ def test_without_a_previous_velocity_only_the_brake_remains() -> None:
 
 
 def test_each_bound_alone_is_the_bound() -> None:
-    """hi and lo follow each side of the velocity, acceleration and position limits."""
+    """Hi and lo follow each side of the velocity, acceleration and position limits."""
     dt, v = 0.01, np.array([0.5])
     far = _limits(9.0, 9.0, velocity=(-1.0, 2.0), acceleration=(-np.inf, np.inf))
     assert (velocity_box(far, v, dt).lower, velocity_box(far, v, dt).upper) == (-1.0, 2.0)
@@ -293,7 +293,7 @@ def test_the_brake_uses_the_acceleration_that_slows_down() -> None:
 
 @pytest.mark.parametrize("gain", [0.05, 0.5, 0.95, 1.0])
 def test_gain_scales_the_position_bound(gain: float) -> None:
-    """hi = gain d/dt and lo = -gain d/dt, whatever the acceleration limits are."""
+    """The bounds are hi = gain d/dt and lo = -gain d/dt, whatever the acceleration limits are."""
     limits = _limits(0.003, 0.002, acceleration=1e9)
     box = velocity_box(limits, np.zeros(1), 0.01, "gain", gain)
     assert box.upper == pytest.approx(gain * 0.2)

@@ -170,7 +170,7 @@ def test_planar_arm_cannot_move_the_rows_that_its_tasks_leave_out(q: Array) -> N
 
 
 def test_limits_of_continuous_joints_are_indexed_by_velocity(kinova: Robot) -> None:
-    """nq = 9, nv = 6: joints 1, 4 and 6 have no position limits, the others their own angle's."""
+    """With nq = 9, nv = 6: joints 1, 4, 6 have no position limits, the others their own angle's."""
     assert (kinova.nq, kinova.nv) == (9, 6)
     continuous = np.array([True, False, False, True, False, True])
     position = kinova.limits.position
@@ -185,7 +185,7 @@ def test_limits_of_continuous_joints_are_indexed_by_velocity(kinova: Robot) -> N
 @settings(deadline=None, max_examples=30)
 @given(step=arrays(float, 6, elements=st.floats(-2.0, 2.0)))
 def test_distances_move_with_the_tangent(kinova: Robot, step: Array) -> None:
-    """q (+) step changes to_upper by -step and to_lower by +step where there is a limit."""
+    """A step changes to_upper by -step and to_lower by +step where there is a limit."""
     limited = [1, 2, 4]
     before = kinova.limits.at(kinova.q0)
     after = kinova.limits.at(pin.integrate(kinova.model, kinova.q0, step))

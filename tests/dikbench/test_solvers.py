@@ -85,7 +85,8 @@ def _mixture() -> tuple[QuadraticProgram, Array]:
     """Everything at once, the optimum put together from its multipliers.
 
     x = (1, 0, 0.5): the upper bound of x_1 active (multiplier 2), the lower one of x_2 (-3), the
-    inequality x_1 + x_3 <= 1.5 active (0.5), x_1 + x_2 - x_3 = 0.5 (-1): q = -(P x + G'z + A'y + w).
+    inequality x_1 + x_3 <= 1.5 active (0.5) and x_1 + x_2 - x_3 = 0.5 (-1), so that
+    q = -(P x + G'z + A'y + w).
     """
     P, x = np.diag([1.0, 2.0, 4.0]), np.array([1.0, 0.0, 0.5])
     G, A = np.array([[1.0, 0.0, 1.0]]), np.array([[1.0, 1.0, -1.0]])
@@ -354,7 +355,7 @@ def test_a_multiplier_of_an_infinite_bound_is_a_dual_residual(sign: int) -> None
 
 
 def test_an_infinite_side_of_an_inequality_does_not_count() -> None:
-    """h = inf constrains nothing: no NaN in the gap from inf times zero."""
+    """It constrains nothing, and inf times zero is no NaN in the gap."""
     program = QuadraticProgram(
         np.eye(1), np.array([-2.0]), np.ones((2, 1)), np.array([np.inf, 1.0])
     )

@@ -189,29 +189,27 @@ def test_a_target_of_the_step_replaces_the_tasks_own() -> None:
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_feed_forward_keeps_the_error_of_a_moving_target(name: str) -> None:
+@pytest.mark.parametrize("seed", range(5))
+def test_feed_forward_keeps_the_error_of_a_moving_target(name: str, seed: int) -> None:
     """A frame that follows the transported V_d keeps its error; with V_d as it is it would not."""
-    robot, random = load_robot(name), np.random.default_rng(5)
+    robot, random = load_robot(name), np.random.default_rng(seed)
     rows = np.array(robot.task_rows)
     h = 1e-5
-    for _ in range(5):
-        q = _random_q(robot, random, 0.4)
-        target = _placement(
-            robot, pin.integrate(robot.model, q, 0.3 * random.normal(size=robot.nv))
-        )
-        V_d = np.zeros(6)
-        V_d[rows] = random.normal(size=len(rows))
-        moved = target * pin.exp6(pin.Motion(h * V_d))
-        task = PoseTask(gain=0.0)
-        here = task.linearize(_at(robot, q), target, V_d)
+    q = _random_q(robot, random, 0.4)
+    target = _placement(robot, pin.integrate(robot.model, q, 0.3 * random.normal(size=robot.nv)))
+    V_d = np.zeros(6)
+    V_d[rows] = random.normal(size=len(rows))
+    moved = target * pin.exp6(pin.Motion(h * V_d))
+    task = PoseTask(gain=0.0)
+    here = task.linearize(_at(robot, q), target, V_d)
 
-        def drift(V: Array) -> float:
-            v = np.linalg.lstsq(here.J, V, rcond=None)[0]
-            there = task.linearize(_at(robot, pin.integrate(robot.model, q, h * v)), moved)
-            return float(np.linalg.norm(there.error - here.error)) / h
+    def drift(V: Array) -> float:
+        v = np.linalg.lstsq(here.J, V, rcond=None)[0]
+        there = task.linearize(_at(robot, pin.integrate(robot.model, q, h * v)), moved)
+        return float(np.linalg.norm(there.error - here.error)) / h
 
-        assert drift(here.V) < 1e-3
-        assert drift(V_d[rows]) > 0.05
+    assert drift(here.V) < 1e-3
+    assert drift(V_d[rows]) > 0.02
 
 
 def test_feed_forward_and_feedback_add_up() -> None:

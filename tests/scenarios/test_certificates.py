@@ -1,0 +1,414 @@
+"""Every family on every robot: what it claims holds, and its parts fit together."""
+
+from __future__ import annotations
+
+import sys
+import typing
+from collections.abc import Callable
+from typing import Any, Literal
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from dikbench.array import Array
+from dikbench.certificate import Certificate, Claim
+from dikbench.errors import DikbenchError
+from dikbench.kinematics import Kinematics
+from dikbench.registry import make_scenario
+from dikbench.robot import Robot
+from dikbench.robot_catalogue import ROBOTS, load_robot
+from dikbench.scenario import Scenario
+from dikbench.simulation import simulate
+from dikbench.solvers.checked import make_solve
+from dikbench.tasks import PostureTask
+from formulations.pseudo_inverse import PseudoInverse
+from scenarios import SCENARIOS
+from scenarios.joint_limit_crossing import CROSSINGS
+from scenarios.near_miss import SINGULARITIES
+
+# What a robot needs beside its name, and variants that are cases of their own.
+EXTRA = {
+    ("near-miss", "panda"): ["singularity=elbow", "singularity=elbow,miss=0.005"],
+    ("near-miss", "ur5"): ["", "miss=0", "miss=0.005", "miss=0.2,speed=0.1"],
+    ("joint-limit-crossing", "panda"): ["", "acceleration=true"],
+    ("speed-sweep", "panda"): ["speed=0.3", "speed=1.3", "speed=2"],
+}
+SEEDS = (1, 2, 3, 4, 5)
+
+
+def _robots(family: Callable[..., Scenario]) -> tuple[str, ...]:
+    """The robots that a family lists; those of the catalogue where it takes any."""
+    hint = typing.get_type_hints(family)["robot"]
+    return typing.get_args(hint) if typing.get_origin(hint) is Literal else tuple(ROBOTS)
+
+
+SELECTORS = [
+    f"{name}[robot={robot}{',' if extra else ''}{extra}]"
+    for name, family in SCENARIOS.items()
+    for robot in _robots(family)
+    for extra in EXTRA.get((name, robot), [""])
+]
+
+
+def _placement(robot: Robot, q: Array) -> pin.SE3:
+    kinematics = Kinematics(robot)
+    kinematics.update(q)
+    return kinematics.placement(robot.frame_id).copy()
+
+
+def _distance(a: pin.SE3, b: pin.SE3) -> float:
+    """Norm of the body twist (m, rad) from one placement to another."""
+    return float(np.linalg.norm(pin.log6(a.actInv(b)).np))
+
+
+def _margin(robot: Robot, q: Array) -> float:
+    seen = robot.limits.at(q)
+    assert seen.to_lower is not None
+    assert seen.to_upper is not None
+    return float(min(seen.to_lower.min(), seen.to_upper.min()))
+
+
+# --- every family, robot and seed
+
+
+@pytest.mark.parametrize("seed", [0, *SEEDS])
+@pytest.mark.parametrize("selector", SELECTORS)
+def test_scenarios_hold_what_they_claim_and_fit_together(selector: str, seed: int) -> None:
+    """The certificate holds, and the start is inside the limits, on the path, and as fast as it."""
+    scenario = make_scenario(selector, seed)
+    assert len(scenario.certificate.claims) >= 2
+    assert all(claim.holds for claim in scenario.certificate.claims)
+    robot, reference = scenario.robot, scenario.reference
+    assert scenario.q0.shape == (robot.nq,)
+    assert scenario.v0.shape == (robot.nv,)
+    assert _margin(robot, scenario.q0) > 0.02
+    velocity = robot.limits.velocity
+    assert velocity is not None
+    assert np.all(scenario.v0 <= velocity.upper * (1 + 1e-9))
+    assert np.all(scenario.v0 >= velocity.lower * (1 + 1e-9))
+    if not reference.moving:
+        assert np.all(scenario.v0 == 0)
+        assert _distance(_placement(robot, scenario.q0), reference.placement(0.0)) > 0.01
+        return
+    assert _distance(_placement(robot, scenario.q0), reference.placement(0.0)) < 1e-8
+    # The start moves as the reference does; slower where that is too fast, never elsewhere.
+    kinematics = Kinematics(robot)
+    kinematics.update(scenario.q0)
+    made = kinematics.jacobian(robot.frame_id) @ scenario.v0
+    wanted = reference.velocity(0.0)
+    size = float(wanted @ wanted)
+    share = float(made @ wanted) / size if size > 0 else 1.0
+    assert made == pytest.approx(share * wanted, abs=1e-6)
+    assert 0 < share <= 1 + 1e-9
+    if share < 1 - 1e-9:
+        assert velocity.usage(scenario.v0).max() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("selector", SELECTORS)
+def test_reference_velocity_is_the_derivative_of_its_placement(selector: str, seed: int) -> None:
+    """The body twist of the path, by central differences, all along it (but for its own kink)."""
+    reference = make_scenario(selector, seed).reference
+    h = 1e-5 * reference.duration
+    for share in (0.0, 0.07, 0.31, 0.49, 0.52, 0.83, 0.99):
+        tau = share * reference.duration
+        start = max(tau - h, 0.0)
+        before, after = reference.placement(start), reference.placement(tau + h)
+        twist = pin.log6(before.actInv(after)).np / (tau + h - start)
+        middle = (start + tau + h) / 2
+        assert twist == pytest.approx(reference.velocity(middle), abs=1e-6, rel=1e-6)
+
+
+def _samples(scenario: Scenario) -> list[Array]:
+    reference = scenario.reference
+    return [
+        reference.placement(share * reference.duration).homogeneous.copy()
+        for share in (0.0, 0.4, 1.0)
+    ]
+
+
+@pytest.mark.parametrize("selector", SELECTORS)
+def test_the_same_seed_is_the_same_scenario(selector: str) -> None:
+    """To the bit: start, velocity, path, duration and certificate."""
+    a, b = make_scenario(selector, 3), make_scenario(selector, 3)
+    assert np.array_equal(a.q0, b.q0)
+    assert np.array_equal(a.v0, b.v0)
+    assert np.array_equal(_samples(a), _samples(b))
+    assert (a.duration, a.dt, a.gain) == (b.duration, b.dt, b.gain)
+    assert a.certificate == b.certificate
+
+
+@pytest.mark.parametrize("selector", SELECTORS)
+def test_every_seed_is_another_scenario(selector: str) -> None:
+    """Start and path differ between any two of them, by no more than a perturbation."""
+    scenarios = [make_scenario(selector, seed) for seed in (0, *SEEDS)]
+    for i, a in enumerate(scenarios):
+        for b in scenarios[:i]:
+            assert np.abs(a.q0 - b.q0).max() > 1e-4
+            assert np.abs(np.array(_samples(a)) - np.array(_samples(b))).max() > 1e-4
+    for perturbed in scenarios[1:]:
+        assert np.abs(perturbed.q0 - scenarios[0].q0).max() < 0.6
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_seed_zero_of_reach_starts_at_the_robots_start(robot: str) -> None:
+    """Nothing is perturbed; another seed moves every joint by at most 0.1 rad."""
+    start = load_robot(robot).q0
+    assert np.array_equal(make_scenario(f"reach[robot={robot}]").q0, start)
+    moved = make_scenario(f"reach[robot={robot}]", 1).q0
+    assert 0 < np.abs(moved - start).max() <= 0.1
+
+
+def test_seed_zero_of_the_speed_sweep_starts_at_the_robots_start() -> None:
+    """Nothing is perturbed."""
+    assert np.array_equal(make_scenario("speed-sweep").q0, load_robot("panda").q0)
+
+
+@pytest.mark.parametrize("robot", CROSSINGS)
+def test_seed_zero_of_a_limit_crossing_has_the_tables_posture(robot: str) -> None:
+    """But for the joint that crosses, which a seed leaves alone too."""
+    where = CROSSINGS[robot]
+    scenario = make_scenario(f"joint-limit-crossing[robot={robot},approach=0.25]")
+    others = np.delete(np.arange(scenario.robot.nv), where.joint)
+    assert np.array_equal(scenario.q0[others], np.array(where.posture)[others])
+    position = scenario.robot.limits.position
+    assert position is not None
+    for seed in (0, 1):
+        q0 = make_scenario(f"joint-limit-crossing[robot={robot},approach=0.25]", seed).q0
+        assert position.upper[where.joint] - q0[where.joint] == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize(("robot", "singularity"), SINGULARITIES)
+def test_seed_zero_of_a_near_miss_passes_the_tables_singularity(
+    robot: str, singularity: str
+) -> None:
+    """The middle of the path is `miss` away from the placement of the posture in the table."""
+    miss = 0.05
+    scenario = make_scenario(f"near-miss[robot={robot},singularity={singularity},miss={miss}]")
+    q_s = np.array(SINGULARITIES[robot, singularity].posture)
+    middle = scenario.reference.placement(scenario.reference.duration / 2)
+    assert _distance(_placement(scenario.robot, q_s), middle) == pytest.approx(miss, rel=1e-9)
+    other = make_scenario(f"near-miss[robot={robot},singularity={singularity},miss={miss}]", 1)
+    assert _distance(other.reference.placement(other.reference.duration / 2), middle) > 1e-3
+
+
+# --- what makes each family what it is
+
+
+@pytest.mark.parametrize(("robot", "singularity"), SINGULARITIES)
+def test_a_nearer_miss_asks_for_more(robot: str, singularity: str) -> None:
+    """The smallest singular value on the path falls and the speed that it asks for grows."""
+    sigma, ratio = [], []
+    for miss in (0.1, 0.05, 0.02, 0.01):
+        text = f"near-miss[robot={robot},singularity={singularity},miss={miss}]"
+        claims = {c.quantity.partition(" ")[0]: c.value for c in _claims(text)}
+        sigma.append(claims["smallest"])
+        ratio.append(claims["required"])
+    assert sigma == sorted(sigma, reverse=True)
+    assert ratio == sorted(ratio)
+    # As 1/miss at a crossing, as 1/sqrt(miss) at a fold.
+    power = 1.0 if SINGULARITIES[robot, singularity].kind == "crossing" else 0.5
+    assert np.log(ratio[-1] / ratio[0]) / np.log(10) == pytest.approx(power, abs=0.15)
+
+
+def _claims(selector: str) -> tuple[Claim, ...]:
+    return make_scenario(selector).certificate.claims
+
+
+@pytest.mark.parametrize("speed", [0.3, 1.0, 1.3])
+def test_the_speed_sweep_peaks_at_its_speed(speed: float) -> None:
+    """Following it exactly, a law without limits moves at that share of the velocity limits."""
+    scenario = make_scenario(f"speed-sweep[speed={speed},dt=0.002,laps=1]")
+    run = simulate(scenario, PseudoInverse(), make_solve(None, None), lambda v, limits, dt: v)
+    velocity = scenario.robot.limits.velocity
+    assert velocity is not None
+    assert velocity.usage(run.trace.applied).max() == pytest.approx(speed, rel=0.05)
+
+
+def test_the_speed_sweep_is_a_circle() -> None:
+    """In the y-z plane, of the radius asked for, through the start, orientation fixed."""
+    scenario = make_scenario("speed-sweep[radius=0.07,laps=2]")
+    reference = scenario.reference
+    start = reference.placement(0.0)
+    centre = start.translation + np.array([0, 0, 0.07])
+    for share in np.linspace(0, 1, 9):
+        X = reference.placement(share * reference.duration)
+        assert np.linalg.norm(X.translation - centre) == pytest.approx(0.07)
+        assert X.translation[0] == pytest.approx(start.translation[0])
+        assert np.array_equal(X.rotation, start.rotation)
+    lap = reference.placement(reference.duration / 2)
+    assert _distance(start, lap) < 1e-9
+
+
+@pytest.mark.parametrize("robot", CROSSINGS)
+def test_a_limit_crossing_asks_for_its_depth_and_comes_back(robot: str) -> None:
+    """Half way the joint would be `depth` beyond its limit; at the end the path is at its start."""
+    scenario = make_scenario(f"joint-limit-crossing[robot={robot},depth=0.15]")
+    reference, joint = scenario.reference, CROSSINGS[robot].joint
+    beyond = scenario.q0.copy()
+    position = scenario.robot.limits.position
+    assert position is not None
+    beyond[joint] = position.upper[joint] + 0.15
+    middle = reference.placement(reference.duration / 2)
+    assert _distance(_placement(scenario.robot, beyond), middle) < 1e-9
+    assert _distance(reference.placement(0.0), reference.placement(reference.duration)) < 1e-9
+
+
+@pytest.mark.parametrize("robot", CROSSINGS)
+def test_a_limit_crossing_peaks_at_its_speed(robot: str) -> None:
+    """The joint moves at the given share of its own velocity limit, at most."""
+    scenario = make_scenario(f"joint-limit-crossing[robot={robot},speed=0.4]")
+    joint, reference = CROSSINGS[robot].joint, scenario.reference
+    velocity = scenario.robot.limits.velocity
+    assert velocity is not None
+    kinematics = Kinematics(scenario.robot)
+    kinematics.update(scenario.q0)
+    # One joint turns the frame about its own axis: its rate is the angular speed.
+    taus = np.linspace(0, reference.duration, 401)
+    rates = [np.linalg.norm(reference.velocity(tau)[3:]) for tau in taus]
+    assert max(rates) == pytest.approx(0.4 * velocity.upper[joint], rel=1e-3)
+
+
+@pytest.mark.parametrize("robot", ["panda", "ur5"])
+def test_the_target_of_reach_is_as_far_as_asked(robot: str) -> None:
+    """`distance` and `angle` away along one body axis (a screw: the log's parts)."""
+    for seed in (0, 1):
+        scenario = make_scenario(f"reach[robot={robot},distance=0.08,angle=0.25]", seed)
+        start = _placement(scenario.robot, scenario.q0)
+        twist = pin.log6(start.actInv(scenario.reference.placement(0.0))).np
+        assert np.linalg.norm(twist[:3]) == pytest.approx(0.08)
+        assert np.linalg.norm(twist[3:]) == pytest.approx(0.25)
+        assert twist[:3] / 0.08 == pytest.approx(twist[3:] / 0.25)
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_acceleration_limits_are_in_force_only_where_asked_for(name: str) -> None:
+    """And are the catalogue's then."""
+    off, on = make_scenario(name), make_scenario(f"{name}[acceleration=true]")
+    assert off.robot.limits.acceleration is None
+    assert on.robot.limits.acceleration is not None
+    assert np.array_equal(on.robot.limits.acceleration.upper, on.robot.available_acceleration)
+    assert np.array_equal(on.robot.limits.acceleration.lower, -on.robot.limits.acceleration.upper)
+
+
+@pytest.mark.parametrize("selector", SELECTORS)
+def test_redundant_arms_hold_a_posture_and_others_have_no_second_task(selector: str) -> None:
+    """The posture of the start, below the tracking, weighted so that it is not seen there."""
+    scenario = make_scenario(selector)
+    if scenario.robot.nv <= len(scenario.robot.task_rows):
+        assert scenario.tasks == ()
+        return
+    (task,) = scenario.tasks
+    assert isinstance(task, PostureTask)
+    assert np.array_equal(task.target, scenario.q0)
+    assert task.priority > 1
+    assert task.weight == pytest.approx(1e-4)
+
+
+# --- scenarios that are not what they say
+
+
+@pytest.mark.parametrize(
+    ("selector", "parts"),
+    [
+        ("near-miss[miss=0.5]", ["near-miss", "miss=0.5 must be between 0.0 and 0.3"]),
+        ("near-miss[miss=-0.01]", ["miss=-0.01 must be between"]),
+        ("near-miss[miss=nan]", ["miss=nan must be between"]),
+        ("near-miss[speed=0]", ["speed=0.0 must be positive"]),
+        ("near-miss[dt=-0.01]", ["dt=-0.01 must be positive"]),
+        (
+            "near-miss[robot=panda,singularity=elbow,miss=0]",
+            ["miss=0.0 must be between 0.002 and 0.3"],  # a fold cannot be touched
+        ),
+        ("speed-sweep[radius=0.5]", ["radius=0.5 must be between 0.02 and 0.15"]),
+        ("joint-limit-crossing[depth=0]", ["depth=0.0 must be between 0.02 and 0.5"]),
+        ("joint-limit-crossing[approach=1e9]", ["joint-limit-crossing", "approach=1"]),
+        ("reach[distance=1]", ["distance=1.0 must be between 0.01 and 0.3"]),
+        # A claim that does not hold: too fast for the arm.
+        ("reach[gain=20]", ["does not hold what it claims", "required speed over limit"]),
+        ("reach[robot=panda,frame=nowhere]", ["unknown frame 'nowhere'", "panda_hand_tcp"]),
+    ],
+)
+def test_impossible_scenarios_are_errors_of_one_line(selector: str, parts: list[str]) -> None:
+    """The parameter and its range, or the claim that is false."""
+    with pytest.raises(DikbenchError) as caught:
+        make_scenario(selector)
+    message = str(caught.value)
+    assert "\n" not in message
+    for part in parts:
+        assert part in message
+
+
+@pytest.mark.parametrize(
+    "parameters", ["robot=panda", "robot=ur5,singularity=elbow", "singularity=elbow"]
+)
+def test_a_singularity_that_a_robot_has_not_lists_the_valid_pairs(parameters: str) -> None:
+    """Every pair of the table, in the form in which it can be asked for."""
+    with pytest.raises(DikbenchError) as caught:
+        make_scenario(f"near-miss[{parameters}]")
+    for robot, singularity in SINGULARITIES:
+        assert f"robot={robot},singularity={singularity}" in str(caught.value)
+
+
+def test_a_limit_that_cannot_be_reached_fails_loudly(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A joint that starts with no room before its limit, or a robot without limits: one line."""
+    module = sys.modules["scenarios.joint_limit_crossing"]
+    load: Callable[..., Robot] = module.load_robot
+    position = load("ur5").limits.position
+    assert position is not None
+    # The shoulder of the posture would start beyond its limit: the certificate says so.
+    upper = position.upper.copy()
+    upper[1] = -1.3
+    narrow = load("ur5").with_limits(position=(position.lower, upper))
+    for robot, words in (
+        (narrow, "position margin at the start"),
+        (load("ur5").with_limits(position=None), "robot ur5 has no limits"),
+    ):
+        monkeypatch.setattr(module, "load_robot", lambda name, robot=robot: robot)
+        with pytest.raises(DikbenchError, match=words) as caught:
+            make_scenario("joint-limit-crossing")
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_a_negative_seed_is_an_error(name: str) -> None:
+    """Random generators take none."""
+    with pytest.raises(DikbenchError, match="seed -1 must not be negative"):
+        make_scenario(name, -1)
+
+
+@pytest.mark.parametrize(
+    ("claim", "holds", "text"),
+    [
+        (Claim("x", 1.0, at_least=0.5), True, "0.5 <= x = 1"),
+        (Claim("x", 0.4, at_least=0.5), False, "0.5 <= x = 0.4"),
+        (Claim("x", 2.0, at_most=1.5), False, "x = 2 <= 1.5"),
+        (Claim("x", 1.0, 0.5, 1.5), True, "0.5 <= x = 1 <= 1.5"),
+        (Claim("x", float("nan")), False, "x = nan"),
+    ],
+)
+def test_claims(claim: Claim, holds: bool, text: str) -> None:
+    """A value in its range holds; NaN is in none; the words show all three."""
+    assert claim.holds == holds
+    assert str(claim) == text
+    certificate = Certificate((Claim("y", 1.0), claim))
+    if holds:
+        certificate.check("mine")
+        return
+    with pytest.raises(DikbenchError, match="scenario 'mine' does not hold what it claims") as e:
+        certificate.check("mine")
+    assert text in str(e.value)
+
+
+def test_a_broken_certificate_stops_the_scenario(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The registry asserts it: nobody can run a scenario that tests something else."""
+
+    def holds(self: Claim) -> bool:
+        return False
+
+    monkeypatch.setattr(Claim, "holds", property(holds))
+    names: list[Any] = list(SCENARIOS)
+    for name in names:
+        with pytest.raises(DikbenchError, match="does not hold what it claims"):
+            make_scenario(name)
