@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from dikbench.array import Array
 from dikbench.quadratic_program import QuadraticProgram
 from dikbench.solvers.answer import Answer
 from dikbench.solvers.catalogue import Solver
@@ -16,7 +17,11 @@ JUDGE: Final = Solver("daqp", "cold", {})
 """An active-set method: where it answers it answers to rounding, and its own answer is checked."""
 
 EXACT: Final = 1e-6
-"""Residuals up to which the judge's own answer is taken for the optimum."""
+"""Residuals up to which the judge's own answer is taken for the optimum of a strictly convex
+program."""
+
+EXACT_COST: Final = 1e-4
+"""The same for other programs, of which only the cost is compared: the judge smooths them."""
 
 
 def distance_to_optimum(program: QuadraticProgram, answer: Answer) -> float:
@@ -34,11 +39,16 @@ def distance_to_optimum(program: QuadraticProgram, answer: Answer) -> float:
     if not judged.claimed or judged.x is None:
         return float("nan")
     found = residuals(program, judged)
-    if not max(found.primal, found.dual, found.gap) <= EXACT:
-        return float("nan")
+    worst = max(found.primal, found.dual, found.gap)
+    if _is_positive_definite(program.P):
+        return float(np.abs(answer.x - judged.x).max()) if worst <= EXACT else float("nan")
+    cost, best = (0.5 * x @ program.P @ x + program.q @ x for x in (answer.x, judged.x))
+    return float(abs(cost - best)) if worst <= EXACT_COST else float("nan")
+
+
+def _is_positive_definite(P: Array) -> bool:
     try:
-        np.linalg.cholesky(program.P)
+        np.linalg.cholesky(P)
     except np.linalg.LinAlgError:
-        cost, best = (0.5 * x @ program.P @ x + program.q @ x for x in (answer.x, judged.x))
-        return float(abs(cost - best))
-    return float(np.abs(answer.x - judged.x).max())
+        return False
+    return True

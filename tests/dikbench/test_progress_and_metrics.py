@@ -274,6 +274,18 @@ def test_the_smallest_singular_value_is_that_of_the_worst_configuration() -> Non
     assert evaluate(recompute(trace, _scenario()))["sigma_min"] == pytest.approx(0.0, abs=1e-12)
 
 
+def test_what_a_step_achieved_is_judged_where_it_began() -> None:
+    """The body Jacobian of the configuration before the step, times the velocity applied in it."""
+    trace = _trace([0.0, 0.0], [[1.0, 0, 0]] * 2, [Status.OK] * 2)
+    trace.applied[0] = [3.0, -5.0, 0.0]
+    trace.applied[1] = [2.0, 0.0, 0.0]
+    trace.q[1:, 1] = 0.0
+    motion = recompute(trace, _scenario())
+    assert motion.achieved[0] == pytest.approx(3.0 * J[:, 0] - 5.0 * J[:, 1])
+    # Stretched: the tip is 0.9 m straight ahead of the base.
+    assert motion.achieved[1] == pytest.approx([0.0, 1.8, 2.0])
+
+
 def test_limits_that_are_not_in_force_are_not_violated() -> None:
     """Zero, and a ratio that is not defined; the shares of violating steps are zero."""
     scenario = _scenario()

@@ -270,6 +270,22 @@ def test_a_parameter_keeps_its_type_where_another_cannot_be_resolved(tmp_path: P
     assert "gain='much' is not valid" in message
 
 
+def test_an_inherited_parameter_keeps_the_type_of_its_base(tmp_path: Path) -> None:
+    """Whose annotations mean something in the base's own file only."""
+    path = tmp_path / "slower.py"
+    path.write_text(
+        "from dataclasses import dataclass\n"
+        "from formulations.pseudo_inverse import PseudoInverse\n"
+        "@dataclass(frozen=True)\n"
+        "class Slower(PseudoInverse):\n"
+        "    factor: float = 0.5\n"
+    )
+    law: Any = make_formulation(f"{path}:Slower[after=clip,rank_tolerance=0.25,factor=0.1]")
+    assert (law.after, law.rank_tolerance, law.factor) == ("clip", 0.25, 0.1)
+    message = _message(make_formulation, f"{path}:Slower[after=cilp]")
+    assert "valid: none, clip, scale" in message
+
+
 def test_a_parameter_that_no_text_can_give_is_an_error(tmp_path: Path) -> None:
     """An array or a function has no form in a selector."""
     selector = _law_with(

@@ -28,6 +28,7 @@ from dikbench.solvers.catalogue import (
 )
 from dikbench.solvers.checked import CheckedSolve, NoSolve, make_solve
 from dikbench.solvers.feasibility import is_feasible
+from dikbench.solvers.optimum import distance_to_optimum
 from dikbench.solvers.residuals import VERIFIED_TOLERANCE, residuals
 
 # The libraries warn beside each failure; `dikbench.solvers` silences them, pytest resets that.
@@ -443,6 +444,34 @@ def test_unknown_residuals_of_a_step_stay_unknown(unknown_first: bool) -> None:
     assert math.isnan(solve.gap)
     assert solve.primal == 0.0
     assert solve.verified
+
+
+def test_a_flat_cost_hides_nothing() -> None:
+    """Half a rad/s beside the optimum where the gradient is 5e-5: the distance says so."""
+    program = QuadraticProgram(np.diag([1.0, 1e-4]), np.array([-1.0, -1e-4]))
+    beside = Answer(np.array([1.0, 1.5]), True)
+    assert residuals(program, beside).verified
+    solve = CheckedSolve(_Script(beside, Answer(np.array([1.0, 1.0]), True)))
+    solve(program)
+    assert solve.distance == pytest.approx(0.5)
+    assert not solve.verified
+    solve.begin_step()
+    solve(program)
+    assert solve.distance == pytest.approx(0.0, abs=1e-9)
+    assert solve.verified
+
+
+def test_the_distance_of_an_alpha_scaling_is_in_alpha() -> None:
+    """Four fifths of the best alpha is 0.1 of 0.5 away, however far the velocities are."""
+    program, x = _scaling()
+    for share, distance in ((1.0, 0.0), (0.8, 0.1)):
+        answer = Answer(share * x, True)
+        assert distance_to_optimum(program, answer) == pytest.approx(distance, abs=1e-6)
+
+
+def test_without_a_judge_the_distance_is_not_known() -> None:
+    """A program without a feasible point has no optimum to be far from."""
+    assert math.isnan(distance_to_optimum(_no_point(), Answer(np.ones(2), True)))
 
 
 def test_a_lie_is_handed_out_and_recorded() -> None:

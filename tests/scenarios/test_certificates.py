@@ -312,14 +312,14 @@ def test_redundant_arms_hold_a_posture_and_others_have_no_second_task(selector: 
 @pytest.mark.parametrize(
     ("selector", "parts"),
     [
-        ("near-miss[miss=0.5]", ["near-miss", "miss=0.5 must be between 0.0 and 0.3"]),
+        ("near-miss[miss=0.5]", ["scenario near-miss: miss=0.5 must be between"]),
         ("near-miss[miss=-0.01]", ["miss=-0.01 must be between"]),
         ("near-miss[miss=nan]", ["miss=nan must be between"]),
-        ("near-miss[speed=0]", ["speed=0.0 must be positive"]),
+        ("near-miss[speed=0]", ["speed=0.0 must be between"]),
         ("near-miss[dt=-0.01]", ["dt=-0.01 must be positive"]),
         (
             "near-miss[robot=panda,singularity=elbow,miss=0]",
-            ["miss=0.0 must be between 0.002 and 0.3"],  # a fold cannot be touched
+            ["miss=0.0 must be between 0.002 and"],  # a fold cannot be touched
         ),
         ("speed-sweep[radius=0.5]", ["radius=0.5 must be between 0.02 and 0.15"]),
         ("joint-limit-crossing[depth=0]", ["depth=0.0 must be between 0.02 and 0.5"]),
