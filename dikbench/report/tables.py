@@ -11,6 +11,9 @@ import pandas as pd
 from dikbench.selector import parse_selector
 
 LAW = ["formulation", "solver"]
+ROUNDING = 1e-9
+"""What is smaller than this is rounding, and shown as 0 (the CSV files keep it)."""
+
 ALL = "all"
 """Stands for all families, all plants."""
 
@@ -126,7 +129,7 @@ def make_table(kind: TableKind, trials: pd.DataFrame) -> pd.DataFrame:
 
 
 def to_markdown(kind: TableKind, table: pd.DataFrame) -> str:
-    """The table as Markdown, a section per family, four significant digits, NaN left empty."""
+    """The table as Markdown, a section per family, four significant digits."""
     lines = [f"# {kind.title}", ""]
     for name, part in table.groupby("family", sort=False):
         shown = part.drop(columns="family")
@@ -162,5 +165,7 @@ def markdown_rows(table: pd.DataFrame) -> str:
 
 def _cell(value: object) -> str:
     if isinstance(value, float):
-        return "" if value != value else f"{value:.4g}"  # NaN is unequal to itself
+        if value != value:  # NaN
+            return ""
+        return f"{value:.4g}" if abs(value) >= ROUNDING else "0"
     return f"{value!s}".replace("|", "\\|")
