@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any, Final, Literal, get_args
 
 import numpy as np
@@ -81,13 +82,21 @@ def solve_dik(
         DikbenchError: on a wrong name, shape or value, or a law that raises, or answers with a
             wrong shape or NaN.
     """
+    if not isinstance(robot, Robot):
+        raise DikbenchError(
+            f"robot: expected a Robot (dikbench.load_robot), got {type(robot).__name__}"
+        )
     law = make_formulation(formulation) if isinstance(formulation, str) else formulation
-    if not np.isfinite(dt) or dt <= 0:
-        raise DikbenchError(f"dt: expected a positive number of seconds, got {dt!r}")
+    if not isinstance(law, Formulation):
+        raise DikbenchError(f"formulation: expected a law or its selector, got {law!r}")
+    _check_positive("dt", dt)
     if reference_frame not in REFERENCE_FRAMES:
         raise unknown("reference_frame", reference_frame, REFERENCE_FRAMES)
     configuration = robot.configuration(q)
     previous = None if v_prev is None else checked_vector(v_prev, robot.nv, "v_prev")
+    _check_tasks(tasks)
+    if solver is not None and not isinstance(solver, str):
+        raise DikbenchError(f"solver: expected a selector such as 'daqp', got {solver!r}")
     kinematics = Kinematics(robot)
     kinematics.update(configuration)
     if (twist is None) == (target is None):
@@ -131,6 +140,18 @@ def _solve_for(law: Formulation, selector: str | None) -> Any:
     return make_solve(solver, program)
 
 
+def _check_positive(name: str, value: object) -> None:
+    if not isinstance(value, Real) or not 0 < value < float("inf"):
+        raise DikbenchError(f"{name}: expected a positive finite number, got {value!r}")
+
+
+def _check_tasks(tasks: object) -> None:
+    if not isinstance(tasks, Sequence) or not all(hasattr(task, "linearize") for task in tasks):
+        raise DikbenchError(
+            "tasks: expected a list of tasks, such as [dikbench.PostureTask(target=robot.q0)]"
+        )
+
+
 def _twist_task(kinematics: Kinematics, twist: object, reference_frame: str) -> LinearizedTask:
     """The task J v = V for a twist that is given in the axes of a reference frame."""
     robot = kinematics.robot
@@ -149,6 +170,5 @@ def _target_task(kinematics: Kinematics, target: Any, gain: float) -> Linearized
         raise DikbenchError(f"target: expected a pinocchio.SE3, got {type(target).__name__}")
     if not np.isfinite(target.homogeneous).all():
         raise DikbenchError("target: expected finite numbers")
-    if not np.isfinite(gain) or gain <= 0:
-        raise DikbenchError(f"gain: expected a positive number, got {gain!r}")
+    _check_positive("gain", gain)
     return PoseTask(target=target, gain=gain).linearize(kinematics)

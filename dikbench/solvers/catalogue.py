@@ -186,11 +186,16 @@ def _settings(
         if key not in back_end.settings:
             valid = ("interface", *back_end.settings)
             raise unknown(f"setting of solver {selector.name}", key, valid)
+        kind = back_end.settings[key]
         try:
-            settings[key] = msgspec.convert(text, back_end.settings[key], strict=False)
+            value: float = msgspec.convert(text, kind, strict=False)
         except msgspec.ValidationError:
-            kind = back_end.settings[key].__name__
             raise DikbenchError(
-                f"solver {selector.name}: {key} must be of type {kind}, got {text!r}"
+                f"solver {selector.name}: {key} must be of type {kind.__name__}, got {text!r}"
             ) from None
+        if kind is not bool and not 0 < value < float("inf"):
+            raise DikbenchError(
+                f"solver {selector.name}: {key} must be positive and finite, got {text!r}"
+            )
+        settings[key] = value
     return MappingProxyType(settings)
