@@ -141,7 +141,7 @@ def _solve_for(law: Formulation, selector: str | None) -> Any:
 
 
 def _check_positive(name: str, value: object) -> None:
-    if not isinstance(value, Real) or not 0 < value < float("inf"):
+    if not isinstance(value, Real) or not 0 < float(value) < float("inf"):
         raise DikbenchError(f"{name}: expected a positive finite number, got {value!r}")
 
 
