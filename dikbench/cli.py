@@ -139,9 +139,7 @@ def run(
     folder = out or Path("runs") / selected.name
     command = shlex.join(["dikbench", *sys.argv[1:]])
     run_study(selected, folder, jobs or available_cores(), command)
-    for title, rows in write_report(folder):
-        click.echo(f"\n{title}\n\n{rows}")
-    click.echo(f"\n{folder / 'report.md'}")
+    click.echo(f"\n{write_report(folder)}\n\n{folder / 'report.md'}")
 
 
 @commands.command("list")

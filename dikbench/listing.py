@@ -84,7 +84,7 @@ def description(text: str) -> str:
     if name in shipped_studies() or name.endswith(".toml"):
         study = load_study(name)
         path = shipped_studies().get(name, name)
-        return f"{study.name} ({path})\n\n{Path(path).read_text(encoding='utf-8')}"
+        return f"# {study.name} ({path})\n\n{Path(path).read_text(encoding='utf-8')}"
     every = [*plugins("formulation"), *plugins("scenario"), *BACK_ENDS, *ROBOTS, *METRICS]
     raise unknown("name", name, [*every, *shipped_studies()])
 

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 
 from dikbench.errors import DikbenchError, unknown
+from dikbench.plants import PLANTS, REFERENCE_MODES
 from dikbench.problem import program_of
 from dikbench.registry import make_formulation, make_scenario
 from dikbench.selector import parse_selector
@@ -114,6 +115,8 @@ def load_study(name_or_file: str) -> Study:
 
 def _explained(reason: str) -> str:
     """An error of msgspec, with the valid keys where the key was wrong."""
+    if "Invalid enum value" in reason:
+        return f"{reason}; valid: {', '.join(PLANTS if 'plants' in reason else REFERENCE_MODES)}"
     if "unknown field" not in reason:
         return reason
     place = Cells if "$.cells" in reason else TimingSettings if "$.timing" in reason else Study

@@ -16,11 +16,11 @@ WORTH_SAYING = 0.01
 """A share of steps above this is remarked upon."""
 
 
-def write_report(path: Path) -> list[tuple[str, str]]:
+def write_report(path: Path) -> str:
     """Make tables, figures and report.md from trials.csv, the manifest and the traces.
 
     Returns:
-        The tables as they are to be printed: (title, Markdown rows over all families).
+        What is to be printed: the tables over all families and what to keep in mind.
 
     Raises:
         DikbenchError: if the folder holds no results.
@@ -34,34 +34,51 @@ def write_report(path: Path) -> list[tuple[str, str]]:
         table.to_csv(path / "tables" / f"{name}.csv", index=False)
         (path / "tables" / f"{name}.md").write_text(to_markdown(kind, table))
         rows = table[table["family"] == ALL].drop(columns="family")
-        shown.append({"name": name, "title": kind.title, "rows": markdown_rows(rows)})
+        text = markdown_rows(rows) if len(rows) else "Nothing was measured."
+        shown.append({"name": name, "title": kind.title, "rows": text})
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("dikbench.report", ""),
         autoescape=False,  # Markdown, not HTML
         undefined=jinja2.StrictUndefined,
         keep_trailing_newline=True,
     )
+    failed = int((~trials["status"].isin(["ok", "skipped"])).sum())
+    skipped = int(trials["status"].eq("skipped").sum())
+    told = remarks(trials)
     text = environment.get_template("report.md.j2").render(
         study=manifest["study"],
         manifest=manifest,
         trials=len(trials),
-        failed=int((~trials["status"].isin(["ok", "skipped"])).sum()),
-        skipped=int(trials["status"].eq("skipped").sum()),
+        failed=failed,
+        skipped=skipped,
         tables=shown,
         figures=draw_figures(folder, trials, manifest),
-        remarks=remarks(trials),
+        remarks=told,
     )
     (path / "report.md").write_text(text)
-    return [(table["title"], table["rows"]) for table in shown]
+    printed = [f"{table['title']}\n\n{table['rows']}\n" for table in shown]
+    counts = f"{len(trials)} trials, {failed} failed, {skipped} skipped.\n"
+    return "\n".join([*printed, counts, *(f"- {remark}" for remark in told)])
 
 
 def remarks(trials: pd.DataFrame) -> list[str]:
     """What a reader must know before believing the tables, generated from the rows."""
-    found = [
-        "Times are cold calls, in one run on one machine: compare ratios.",
-        "The optimum of a law without a null-space term is not unique: solvers may differ in the "
-        "joint motion and agree in the task.",
-    ]
+    found = []
+    if trials["law_time_median_us"].notna().any():
+        found.append("Times are cold calls, in one run on one machine: compare ratios.")
+    if trials["reference"].eq("time").all():
+        found.append(
+            "The reference moved on with the clock: laws that slow down fall behind by design. "
+            "Run with `--reference path` to let it wait for them."
+        )
+    found.append(
+        "A scenario without a path (a step) starts with its full error, which is then its largest: "
+        "see position_error_final_m."
+    )
+    found.append(
+        "Where a solver is far from the optimum its row measures the solver, not the law; a wrong "
+        "answer can look better than the right one."
+    )
     skipped = trials[trials["status"] == "skipped"]
     for formulation, solver, message, number in _counted(skipped, [*LAW, "message"]):
         found.append(f"{formulation} with {solver}: {number} cells skipped: {message}.")

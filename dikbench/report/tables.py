@@ -11,11 +11,12 @@ import pandas as pd
 from dikbench.selector import parse_selector
 
 LAW = ["formulation", "solver"]
+HOW = ["plant", "reference"]
 ROUNDING = 1e-9
 """What is smaller than this is rounding, and shown as 0 (the CSV files keep it)."""
 
 ALL = "all"
-"""Stands for all families, all plants."""
+"""Stands for all families."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,7 @@ TABLES: Mapping[str, TableKind] = MappingProxyType(
                 Column("progress_mean", "median", "progress median"),
                 Column("progress_min", "min", "progress worst"),
                 Column("stuck_share", "max", "stuck worst share"),
+                Column("optimum_distance_max_rad_s", "max", "solver from optimum [rad/s]"),
             ),
         ),
         "limit_violation": TableKind(
@@ -92,7 +94,7 @@ def family(scenario: str) -> str:
 
 
 def make_table(kind: TableKind, trials: pd.DataFrame) -> pd.DataFrame:
-    """A table, overall and per family, per plant where the plant matters.
+    """A table, overall and per family; plants and reference modes are never pooled.
 
     Rows that were skipped, or failed, count in `trials` and `failed` and carry no numbers.
 
@@ -101,22 +103,24 @@ def make_table(kind: TableKind, trials: pd.DataFrame) -> pd.DataFrame:
         trials: the rows of trials.csv.
 
     Returns:
-        Columns family, plant, formulation, solver, trials, failed, and the table's own.
+        Columns family, plant, reference, formulation, solver, trials, failed, and the table's own
+        (of times: family, formulation, solver and the table's own).
     """
     timing = kind is TABLES["timing"]
+    keys = ["family", *([] if timing else HOW), *LAW]
     ran = trials[trials["status"] != "skipped"]
     frame = ran.assign(family=ran["scenario"].map(family))
     if timing:
         # Times belong to a law, a solver and a scenario; they stand on the row of each plant.
-        frame = frame.drop_duplicates([*LAW, "scenario"]).assign(plant=ALL)
+        frame = frame.drop_duplicates([*LAW, "scenario"])
         frame = frame[frame["law_time_median_us"].notna()]
     if frame.empty:
-        headings = ["family", *([] if timing else ["plant"]), *LAW]
-        return pd.DataFrame(columns=[*headings, *(column.heading for column in kind.columns)])
+        headings = [*keys, *(column.heading for column in kind.columns)]
+        return pd.DataFrame(columns=headings)
     whole = frame.assign(family=ALL)
     parts = []
     for part in (whole, frame):
-        groups = part.groupby(["family", "plant", *LAW], sort=False, dropna=False)
+        groups = part.groupby(keys, sort=False, dropna=False)
         columns = {
             "trials": groups.size(),
             "failed": groups["status"].agg(lambda s: int((s != "ok").sum())),
@@ -125,7 +129,7 @@ def make_table(kind: TableKind, trials: pd.DataFrame) -> pd.DataFrame:
             columns[column.heading] = groups[column.of].agg(column.how)
         parts.append(pd.DataFrame(columns).reset_index())
     table = pd.concat(parts, ignore_index=True)
-    return table.drop(columns=["plant", "trials", "failed"]) if timing else table
+    return table.drop(columns=["trials", "failed"]) if timing else table
 
 
 def to_markdown(kind: TableKind, table: pd.DataFrame) -> str:

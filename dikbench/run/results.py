@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -54,6 +54,12 @@ class ResultsFolder:
             raise DikbenchError(f"output folder {self.path} cannot be written: {reason}") from None
         if not os.access(self.path, os.W_OK | os.X_OK) or not os.access(self.traces, os.W_OK):
             raise DikbenchError(f"output folder {self.path} cannot be written: permission denied")
+
+    def forget_traces_but(self, names: Collection[str]) -> None:
+        """Remove the traces of an earlier run into this folder: they belong to no row any more."""
+        for path in self.traces.glob("*.npz"):
+            if path.stem not in names:
+                path.unlink()
 
     def write(self, rows: Sequence[Row], times: Sequence[Row], manifest: dict[str, Any]) -> None:
         """Write the table and the manifest; each replaces its predecessor in one move."""

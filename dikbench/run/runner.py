@@ -45,6 +45,7 @@ def run_study(study: Study, out: Path, jobs: int, command: str) -> ResultsFolder
     rows = run_trials(planned, folder.traces, jobs)
     times = time_cells(study, planned) if study.timing is not None else []
     folder.write(rows, times, description)
+    folder.forget_traces_but({p.trial.id for p in planned})
     return folder
 
 

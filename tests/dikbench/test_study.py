@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from dikbench.errors import DikbenchError
+from dikbench.listing import description
 from dikbench.study import Selection, Study, expand, load_study, select, shipped_studies
 
 MINIMAL = """
@@ -146,3 +147,8 @@ def test_a_timing_reference_that_needs_a_solver_is_an_error(write_study: WriteSt
     path = write_study(MINIMAL + '[timing]\nreference = "qp"\n')
     with pytest.raises(DikbenchError, match="needs a solver"):
         expand(load_study(path))
+
+
+def test_a_study_as_it_is_shown_is_a_study(write_study: WriteStudy) -> None:
+    """What `dikbench show quick` prints can be saved and run."""
+    assert load_study(write_study(description("quick"))).scenarios == load_study("quick").scenarios
