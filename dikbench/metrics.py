@@ -209,7 +209,7 @@ METRICS: Mapping[str, Metric] = MappingProxyType(
             ),
             Metric(
                 "violating_share", "", "low", 1.0, "limit violation",
-                "share of the steps that end outside a position limit or move too fast, by over 1e-4",
+                "share of the steps that end outside a position limit or move too fast, by > 1e-4",
                 _violating_share,
             ),
             Metric(
