@@ -193,9 +193,10 @@ def _settings(
             raise DikbenchError(
                 f"solver {selector.name}: {key} must be of type {kind.__name__}, got {text!r}"
             ) from None
-        if kind is not bool and not 0 < value < float("inf"):
+        least = 1 if kind is int else 0  # a tolerance may be switched off by 0
+        if kind is not bool and not least <= value < float("inf"):
             raise DikbenchError(
-                f"solver {selector.name}: {key} must be positive and finite, got {text!r}"
+                f"solver {selector.name}: {key} must be finite and at least {least}, got {text!r}"
             )
         settings[key] = value
     return MappingProxyType(settings)

@@ -21,9 +21,18 @@ FINE: dict[str, Any] = {"formulation": "dls", "twist": [0.1, 0, 0, 0, 0, 0]}
         ({"tasks": None}, "tasks: expected a list"),
         ({"tasks": PostureTask(target=PANDA.q0)}, "tasks: expected a list"),
         ({"formulation": 3}, "formulation: expected a law"),
-        ({"formulation": "qp", "solver": "osqp[eps_abs=-1]"}, "eps_abs must be positive"),
-        ({"formulation": "qp", "solver": "piqp[eps_abs=nan]"}, "eps_abs must be positive"),
-        ({"formulation": "qp", "solver": "daqp[iter_limit=-1]"}, "iter_limit must be positive"),
+        (
+            {"formulation": "qp", "solver": "osqp[eps_abs=-1]"},
+            "eps_abs must be finite and at least 0",
+        ),
+        (
+            {"formulation": "qp", "solver": "piqp[eps_abs=nan]"},
+            "eps_abs must be finite and at least 0",
+        ),
+        (
+            {"formulation": "qp", "solver": "daqp[iter_limit=-1]"},
+            "iter_limit must be finite and at least 1",
+        ),
     ],
 )
 def test_an_argument_of_the_wrong_kind_is_one_line(change: dict[str, Any], expected: str) -> None:
