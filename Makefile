@@ -7,11 +7,8 @@ help:            ## this list
 setup:           ## environment with the tested versions
 	python3 -m venv .venv && .venv/bin/pip install -c constraints.txt -e ".[test]"
 
-test:            ## the fast tests
-	$(PYTHON) -m pytest -m "not slow"
-
-test-slow:       ## the tests that take minutes
-	$(PYTHON) -m pytest -m slow
+test:            ## the tests
+	$(PYTHON) -m pytest
 
 lint:            ## style, format and types
 	$(PYTHON) -m ruff check . && $(PYTHON) -m ruff format --check . && $(PYTHON) -m mypy
@@ -28,4 +25,4 @@ quick:           ## the default study
 constraints:     ## the installed versions become the tested ones
 	.venv/bin/pip freeze --exclude-editable --exclude pip --exclude setuptools > constraints.txt
 
-.PHONY: help setup test test-slow lint format contract quick constraints
+.PHONY: help setup test lint format contract quick constraints
