@@ -21,13 +21,16 @@ asks for the way back: hi = max(d/dt, -v_back) with v_back a tenth of the veloci
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from types import MappingProxyType
 from typing import Final, Literal, get_args
 
 import numpy as np
 
 from dikbench.array import Array
 from dikbench.errors import unknown
-from dikbench.limits import Limits
+from dikbench.limits import JointLimits, Limits
 
 Braking = Literal["one-step", "gain", "sqrt", "viable"]
 BRAKINGS: Final = get_args(Braking)
@@ -41,12 +44,16 @@ CONFLICT: Final = 1e-9
 WEAKEST: Final = 1e-9
 """Deceleration [rad/s^2] below which a joint counts as having none (keeps k finite)."""
 
+HAIR: Final = 1e-9
+"""Share of a distance, and distance [rad], by which rounding cannot bring a limit nearer."""
+
 
 class Box:
     """Bounds on the velocity of one control step.
 
     Attributes:
-        lower, upper: (nv,) [rad/s or m/s], lower <= upper, infinite where nothing is in force.
+        lower, upper: (nv,) [rad/s or m/s], lower <= upper, infinite where nothing is in force; to
+            be read, not written to: away from limits every step has the same two arrays.
         relaxed: number of joints whose acceleration bound had to be given up.
     """
 
@@ -77,33 +84,116 @@ def velocity_box(
     Raises:
         DikbenchError: on an unknown braking.
     """
-    if braking not in BRAKINGS:
-        raise unknown("braking", braking, BRAKINGS)
     joint = limits.joint
-    gain = position_gain if braking == "gain" else 1.0
-    brakes = braking in {"sqrt", "viable"} and joint.acceleration is not None
-    if limits.to_lower is None or limits.to_upper is None:
-        upper = np.full(joint.nv, np.inf)
-        lower = -upper
+    inside = _interior(joint, dt, braking, position_gain)
+    if inside is None or not inside.holds(limits.coordinates):
+        lower, upper = _without_acceleration(limits, dt, braking, position_gain)
+    elif v_prev is None or inside.slowest is None or inside.fastest is None:
+        return inside.box
     else:
-        upper = limits.to_upper * (gain / dt)
-        lower = limits.to_lower * (-gain / dt)
-        if brakes:
-            assert joint.acceleration is not None
-            slow_up, slow_down = -joint.acceleration.lower, joint.acceleration.upper
-            brake = viable_brake if braking == "viable" else sqrt_brake
-            upper = np.minimum(upper, brake(limits.to_upper, slow_up, dt))
-            lower = np.maximum(lower, -brake(limits.to_lower, slow_down, dt))
-        if limits.to_upper.min() < 0 or limits.to_lower.min() < 0:
-            _ask_for_the_way_back(limits, upper, lower, dt)
-    if joint.velocity is not None:
-        upper = np.minimum(upper, joint.velocity.upper)
-        lower = np.maximum(lower, joint.velocity.lower)
+        lower = np.maximum(inside.box.lower, v_prev + inside.slowest)
+        upper = np.minimum(inside.box.upper, v_prev + inside.fastest)
+        if True not in (lower > upper).tolist():
+            return Box(lower, upper, 0)
+        lower, upper = inside.box.lower, inside.box.upper
     if joint.acceleration is None or v_prev is None:
         return Box(lower, upper, 0)
     return _with_acceleration(
         lower, upper, v_prev + joint.acceleration.lower * dt, v_prev + joint.acceleration.upper * dt
     )
+
+
+def _without_acceleration(
+    limits: Limits, dt: float, braking: Braking, position_gain: float
+) -> tuple[Array, Array]:
+    """The bounds of position and velocity limits, (nv,) each."""
+    joint = limits.joint
+    gain = position_gain if braking == "gain" else 1.0
+    to_lower, to_upper = limits.to_lower, limits.to_upper
+    if to_lower is None or to_upper is None:
+        upper = np.full(joint.nv, np.inf)
+        lower = -upper
+    else:
+        upper = to_upper * (gain / dt)
+        lower = to_lower * (-gain / dt)
+        if braking in BRAKES and joint.acceleration is not None:
+            slow_up, slow_down = -joint.acceleration.lower, joint.acceleration.upper
+            brake = BRAKES[braking]
+            upper = np.minimum(upper, brake(to_upper, slow_up, dt))
+            lower = np.maximum(lower, -brake(to_lower, slow_down, dt))
+        if to_upper.min() < 0 or to_lower.min() < 0:
+            _ask_for_the_way_back(joint, to_lower, to_upper, upper, lower, dt)
+    if joint.velocity is not None:
+        upper = np.minimum(upper, joint.velocity.upper)
+        lower = np.maximum(lower, joint.velocity.lower)
+    return lower, upper
+
+
+class _Interior:
+    """Where no position limit bounds the velocity: between `above` and `below`, coordinates (nv,).
+
+    There the box is the velocity limits (and acceleration limits about v_prev), which saves a fast
+    law most of its time.
+    """
+
+    __slots__ = ("above", "below", "box", "fastest", "slowest")
+
+    def __init__(self, joint: JointLimits, dt: float, braking: Braking, gain: float) -> None:
+        assert joint.velocity is not None
+        lower, upper = joint.velocity.lower.copy(), joint.velocity.upper.copy()
+        lower.flags.writeable = upper.flags.writeable = False
+        self.box = Box(lower, upper, 0)
+        self.slowest = self.fastest = None
+        deceleration = np.full(joint.nv, np.inf), np.full(joint.nv, np.inf)
+        if joint.acceleration is not None:
+            self.slowest, self.fastest = joint.acceleration.lower * dt, joint.acceleration.upper * dt
+            deceleration = joint.acceleration.upper, -joint.acceleration.lower
+        self.above = self.below = None
+        if joint.position is not None:
+            with np.errstate(invalid="ignore", divide="ignore"):  # no limit is never far enough
+                below = _reach(upper, deceleration[1], dt, braking, gain)
+                above = _reach(-lower, deceleration[0], dt, braking, gain)
+                self.above = joint.position.lower + above
+                self.below = joint.position.upper - below
+
+    def holds(self, coordinates: Array | None) -> bool:
+        """Whether these coordinates (nv,) are inside; for so few, a list is faster than `all`."""
+        return self.above is None or not (
+            False in (coordinates > self.above).tolist()
+            or False in (coordinates < self.below).tolist()
+        )
+
+
+@lru_cache(maxsize=256)
+def _interior(joint: JointLimits, dt: float, braking: Braking, gain: float) -> _Interior | None:
+    """The interior of these limits; None where it depends on the distance everywhere.
+
+    Raises:
+        DikbenchError: on an unknown braking.
+    """
+    if braking not in BRAKINGS:
+        raise unknown("braking", braking, BRAKINGS)
+    return None if joint.velocity is None else _Interior(joint, dt, braking, gain)
+
+
+def _reach(speed: Array, deceleration: Array, dt: float, braking: Braking, gain: float) -> Array:
+    """Distance (nv,) [rad] from which a position limit allows this speed (nv,) [rad/s].
+
+    The inverse of the bounds, which grow with the distance, and a hair for rounding.
+    """
+    if braking == "gain":
+        distance = speed * dt / gain
+    elif braking == "one-step":
+        distance = speed * dt
+    else:
+        slow = np.maximum(deceleration, WEAKEST)
+        if braking == "sqrt":
+            distance = speed**2 / (2 * slow)
+        else:
+            k = np.floor(speed / (slow * dt))
+            distance = dt * ((k + 1) * speed - np.where(k > 0, slow, 0.0) * dt * k * (k + 1) / 2)
+        distance = np.maximum(speed * dt, np.minimum(distance, FAR))
+    return distance * (1 + HAIR) + HAIR
 
 
 def viable_brake(distance: Array, deceleration: Array, dt: float) -> Array:
@@ -128,14 +218,20 @@ def sqrt_brake(distance: Array, deceleration: Array, dt: float) -> Array:
     return np.where(braked, np.sqrt(2 * np.where(braked, deceleration, 0.0) * d), np.inf)
 
 
-def _ask_for_the_way_back(limits: Limits, upper: Array, lower: Array, dt: float) -> None:
+BRAKES: Final[Mapping[str, Callable[[Array, Array, float], Array]]] = MappingProxyType(
+    {"sqrt": sqrt_brake, "viable": viable_brake}
+)
+"""(distance (nv,) [rad], deceleration (nv,) [rad/s^2], dt [s]) -> speed (nv,) [rad/s]."""
+
+
+def _ask_for_the_way_back(
+    joint: JointLimits, to_lower: Array, to_upper: Array, upper: Array, lower: Array, dt: float
+) -> None:
     """Overwrite, in place, the bounds of the joints that are outside a position limit."""
-    assert limits.to_lower is not None
-    assert limits.to_upper is not None
-    above, below = limits.to_upper < 0, limits.to_lower < 0
-    upper[above] = limits.to_upper[above] / dt
-    lower[below] = -limits.to_lower[below] / dt
-    way_back = limits.joint.way_back
+    above, below = to_upper < 0, to_lower < 0
+    upper[above] = to_upper[above] / dt
+    lower[below] = -to_lower[below] / dt
+    way_back = joint.way_back
     if way_back is not None:
         up, down = way_back
         upper[above] = np.maximum(upper[above], -down[above])

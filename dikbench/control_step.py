@@ -27,48 +27,59 @@ class Outcome:
 
     Attributes:
         velocity: the law's velocity or the fallback's, (nv,) [rad/s].
-        status: `ok`, `infeasible`, `solver-failed` or `not-verified` (`stuck` is judged by the
-            motion, see `progress`).
+        status: `ok`, `infeasible` or `solver-failed` (whether an answer is verified is known after
+            the recheck, `stuck` is judged by the motion).
         law_ns: time in the law, its solver included, rechecking excluded [ns].
+        square: v^T v.
     """
 
-    __slots__ = ("law_ns", "status", "velocity")
+    __slots__ = ("law_ns", "square", "status", "velocity")
 
-    def __init__(self, velocity: Array, status: Status, law_ns: int) -> None:
+    def __init__(self, velocity: Array, status: Status, law_ns: int, square: float) -> None:
         self.velocity = velocity
         self.status = status
         self.law_ns = law_ns
+        self.square = square
 
 
-def control_step(formulation: Formulation, problem: DikProblem, solve: CheckedSolve) -> Outcome:
-    """Ask the law for this step's velocity.
+def control_step(
+    formulation: Formulation, problem: DikProblem, solve: CheckedSolve, step: int = 0
+) -> Outcome:
+    """Ask the law for the velocity of this step (its number in the run).
 
     Raises:
         TrialEnded: if the law raises anything but `CannotAnswer`, or returns what is not a finite
             vector (nv,) of real numbers.
     """
-    solve.begin_step()
+    solve.begin_step(step)
     start = perf_counter_ns()
     try:
         v = formulation.velocity(problem, solve)
     except CannotAnswer as error:
         law_ns = perf_counter_ns() - start - solve.checking_ns
         status = Status.INFEASIBLE if isinstance(error, Infeasible) else Status.SOLVER_FAILED
-        return Outcome(fallback(problem), status, law_ns)
+        v = fallback(problem)
+        return Outcome(v, status, law_ns, float(v.dot(v)))
     except MemoryError as error:
         raise TrialEnded(Status.OUT_OF_MEMORY, f"{type(error).__name__}: {error}") from error
     except Exception as error:
         message = str(error).strip().partition("\n")[0]
         raise TrialEnded(Status.FORMULATION_ERROR, f"{type(error).__name__}: {message}") from error
     law_ns = perf_counter_ns() - start - solve.checking_ns
-    if not isinstance(v, np.ndarray) or v.shape != (problem.robot.nv,):
+    return Outcome(v, Status.OK, law_ns, _square(v, problem.robot.nv))
+
+
+def _square(v: object, nv: int) -> float:
+    """v^T v of what a law returned, which is checked first."""
+    if not isinstance(v, np.ndarray) or v.shape != (nv,):
         shape = getattr(v, "shape", type(v).__name__)
-        raise TrialEnded(Status.WRONG_SHAPE, f"expected ({problem.robot.nv},), got {shape}")
+        raise TrialEnded(Status.WRONG_SHAPE, f"expected ({nv},), got {shape}")
     if v.dtype.kind not in "fiu":
         raise TrialEnded(Status.WRONG_SHAPE, f"expected real numbers, got {v.dtype}")
-    if not np.isfinite(v).all():
+    square = float(v.dot(v))
+    if not square < np.inf and not np.isfinite(v).all():
         raise TrialEnded(Status.NOT_FINITE, f"velocity {v.tolist()}")
-    return Outcome(v, Status.OK if solve.verified else Status.NOT_VERIFIED, law_ns)
+    return square
 
 
 def fallback(problem: DikProblem) -> Array:

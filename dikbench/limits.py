@@ -120,9 +120,13 @@ class JointLimits:
     def at(self, q: Array) -> Limits:
         """The limits as seen from configuration q (nq,)."""
         if self.position is None:
-            return Limits(self, None, None)
-        x = q[self.q_index]
-        return Limits(self, x - self.position.lower, self.position.upper - x)
+            return Limits(self, None)
+        return Limits(self, q if self._coordinates_are_q else q[self.q_index])
+
+    @cached_property
+    def _coordinates_are_q(self) -> bool:
+        """Whether q_index is 0, 1, 2, ...: q itself then serves, without a copy."""
+        return bool(np.array_equal(self.q_index, np.arange(self.nv)))
 
 
 class Limits:
@@ -130,14 +134,29 @@ class Limits:
 
     Attributes:
         joint: the limits in force (velocity, acceleration, effort).
-        to_lower: distance to the lower position limits in the tangent space, q - q_min [rad or m],
-            shape (nv,); negative outside; None where position limits are not in force.
-        to_upper: likewise q_max - q.
+        coordinates: the coordinate of each velocity that position limits bound [rad or m], (nv,);
+            None where position limits are not in force.
     """
 
-    __slots__ = ("joint", "to_lower", "to_upper")
+    __slots__ = ("coordinates", "joint")
 
-    def __init__(self, joint: JointLimits, to_lower: Array | None, to_upper: Array | None) -> None:
+    def __init__(self, joint: JointLimits, coordinates: Array | None) -> None:
         self.joint = joint
-        self.to_lower = to_lower
-        self.to_upper = to_upper
+        self.coordinates = coordinates
+
+    @property
+    def to_lower(self) -> Array | None:
+        """Distance to the lower position limits in the tangent space, q - q_min [rad or m], (nv,).
+
+        Negative outside; None where position limits are not in force.
+        """
+        if self.coordinates is None or self.joint.position is None:
+            return None
+        return self.coordinates - self.joint.position.lower
+
+    @property
+    def to_upper(self) -> Array | None:
+        """Likewise q_max - q."""
+        if self.coordinates is None or self.joint.position is None:
+            return None
+        return self.joint.position.upper - self.coordinates

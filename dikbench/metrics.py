@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 from types import MappingProxyType
 from typing import Final, Literal
 
 import numpy as np
-import pinocchio as pin
 
 from dikbench.array import Array
 from dikbench.limits import Interval
@@ -118,9 +116,7 @@ def _violating_share(motion: Motion) -> float:
 
 
 def _travel(motion: Motion) -> float:
-    model, q = motion.scenario.robot.model, motion.trace.q
-    steps = [np.abs(pin.difference(model, a, b)).sum() for a, b in pairwise(q)]
-    return float(np.sum(steps))
+    return float(np.abs(motion.trace.applied).sum() * motion.trace.dt)
 
 
 def _stuck_share(motion: Motion) -> float:
@@ -254,7 +250,7 @@ METRICS: Mapping[str, Metric] = MappingProxyType(
             Metric(
                 "sigma_min", "", "high", 0.0, "tracking error",
                 "smallest singular value of the task Jacobian (m, rad) on the way",
-                lambda m: float(m.sigma_min.min()),
+                lambda m: m.sigma_min,
             ),
         )
     }

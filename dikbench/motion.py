@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
 
 import numpy as np
-import pinocchio as pin
 
 from dikbench.array import Array
 from dikbench.kinematics import Kinematics
 from dikbench.scenario import Scenario
 from dikbench.trace import Trace
+
+BLUR: Final = 1e-6
+"""How much squaring a Jacobian may change its smallest singular value (m, rad)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,37 +26,73 @@ class Motion:
         scenario: the case that it is a trace of.
         position_error: distance of the task frame from its target, (n + 1,) [m].
         orientation_error: angle between them, (n + 1,) [rad].
-        achieved: twist of the task frame under the applied velocity, (n, m) [m/s; rad/s].
-        sigma_min: smallest singular value of the task Jacobian (m, rad), (n + 1,).
+        jacobians: task Jacobians (m, rad), (n + 1, m, nv).
     """
 
     trace: Trace
     scenario: Scenario
     position_error: Array
     orientation_error: Array
-    achieved: Array
-    sigma_min: Array
+    jacobians: Array
+
+    @cached_property
+    def achieved(self) -> Array:
+        """Twist of the task frame under the applied velocity, (n, m) [m/s; rad/s]."""
+        twists: Array = np.einsum("kij,kj->ki", self.jacobians[:-1], self.trace.applied)
+        return twists
+
+    @cached_property
+    def sigma_min(self) -> float:
+        """Smallest singular value of the task Jacobian (m, rad) on the way."""
+        J = self.jacobians
+        # Squares are fast and blur small values: they only say where to look.
+        squares = np.linalg.eigvalsh(J @ J.transpose(0, 2, 1))[:, 0]
+        rough = np.sqrt(np.maximum(squares, 0.0))
+        candidates = J[rough <= rough.min() + BLUR]
+        return float(np.linalg.svd(candidates, compute_uv=False)[:, -1].min())
 
 
 def recompute(trace: Trace, scenario: Scenario) -> Motion:
     """Compute the motion of the task frame from the recorded configurations and velocities."""
-    robot, reference = scenario.robot, scenario.reference
-    kinematics, rows = Kinematics(robot), np.array(robot.task_rows)
-    n = trace.steps
-    position, orientation = np.empty(n + 1), np.empty(n + 1)
-    J = np.empty((n + 1, len(rows), robot.nv))
+    robot, frame = scenario.robot, scenario.robot.frame_id
+    kinematics, n = Kinematics(robot), trace.steps
+    rotations, translations = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
+    jacobians = np.empty((n + 1, 6, robot.nv))
     for k, q in enumerate(trace.q):
         kinematics.update(q)
-        X = kinematics.placement(robot.frame_id)
-        X_d = reference.placement(float(trace.tau[k]))
-        position[k] = np.linalg.norm(X.translation - X_d.translation)
-        orientation[k] = np.linalg.norm(pin.log3(X.rotation.T @ X_d.rotation))
-        J[k] = kinematics.jacobian(robot.frame_id)[rows]
+        X = kinematics.placement(frame)
+        rotations[k], translations[k] = X.rotation, X.translation
+        jacobians[k] = kinematics.jacobian(frame)
+    wanted_rotations, wanted_translations = _wanted(trace, scenario)
+    rows = np.array(robot.task_rows)
     return Motion(
         trace=trace,
         scenario=scenario,
-        position_error=position,
-        orientation_error=orientation,
-        achieved=np.einsum("kij,kj->ki", J[:n], trace.applied),
-        sigma_min=np.asarray(np.linalg.svd(J, compute_uv=False)[:, -1], dtype=float),
+        position_error=np.linalg.norm(translations - wanted_translations, axis=1),
+        orientation_error=rotation_angles(rotations, wanted_rotations),
+        jacobians=jacobians if len(rows) == 6 else jacobians[:, rows],
     )
+
+
+def _wanted(trace: Trace, scenario: Scenario) -> tuple[Array, Array]:
+    """Rotations (n + 1, 3, 3) and translations (n + 1, 3) of the reference at the trace's tau."""
+    n = trace.steps
+    if n <= scenario.steps and np.array_equal(trace.tau, np.arange(n + 1) * scenario.dt):
+        rotations, translations = scenario.target_arrays
+        return rotations[: n + 1], translations[: n + 1]
+    placements = [scenario.reference.placement(float(tau)) for tau in trace.tau]
+    return np.array([X.rotation for X in placements]), np.array([X.translation for X in placements])
+
+
+def rotation_angles(first: Array, second: Array) -> Array:
+    """Angle of R1^T R2 for each pair of rotations (n, 3, 3), (n,) [rad].
+
+    atan2 of its sine, half the length of the axial vector, and its cosine, (trace - 1)/2.
+    """
+    R = np.einsum("kji,kjl->kil", first, second)
+    axial = np.stack(
+        [R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1
+    )
+    cosine = np.trace(R, axis1=1, axis2=2) - 1
+    angles: Array = np.arctan2(np.linalg.norm(axial, axis=1), cosine)
+    return angles

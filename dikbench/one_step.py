@@ -19,7 +19,7 @@ from dikbench.progress import STUCK_PROGRESS, progress, row_weights
 from dikbench.registry import make_formulation
 from dikbench.robot import Robot, checked_vector
 from dikbench.solvers.catalogue import DEFAULT_SOLVER, parse_solver, why_not
-from dikbench.solvers.checked import make_solve
+from dikbench.solvers.checked import CheckedSolve, make_solve
 from dikbench.status import Status
 from dikbench.tasks import LinearizedTask, PoseTask, Task
 
@@ -115,19 +115,22 @@ def solve_dik(
         sorted([main, *(task.linearize(kinematics) for task in tasks)], key=lambda t: t.priority),
         robot.limits.at(configuration),
     )
+    solve = _solve_for(law, solver)
     try:
-        outcome = control_step(law, problem, _solve_for(law, solver))
+        outcome = control_step(law, problem, solve)
     except TrialEnded as ended:
         raise DikbenchError(f"{ended.status.value}: {ended}") from ended
     v = outcome.velocity
     alpha = float(progress(main.V[None], (main.J @ v)[None], row_weights(robot.task_rows))[0])
-    status = outcome.status
+    status, verdicts = outcome.status, solve.verdicts()
+    if status is Status.OK and verdicts.claimed[0] == 1 and verdicts.verified[0] == 0:
+        status = Status.NOT_VERIFIED
     if status is Status.OK and alpha < STUCK_PROGRESS:
         status = Status.STUCK
     return DikAnswer(v, alpha, status, problem.relaxed)
 
 
-def _solve_for(law: Formulation, selector: str | None) -> Any:
+def _solve_for(law: Formulation, selector: str | None) -> CheckedSolve:
     program = program_of(law)
     if program is None:
         if selector is not None:

@@ -49,12 +49,12 @@ class Robot:
         """A `pinocchio.Data` of its own for laws that need more than the task Jacobian."""
         return self.model.createData()
 
-    @property
+    @cached_property
     def nq(self) -> int:
         """Number of configuration coordinates."""
         return int(self.model.nq)
 
-    @property
+    @cached_property
     def nv(self) -> int:
         """Number of velocities."""
         return int(self.model.nv)

@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
 
 from dikbench.array import Array
 from dikbench.certificate import Certificate
@@ -43,7 +48,23 @@ class Scenario:
         """Check that a run ends (see `steps_in`)."""
         steps_in(self.duration, self.dt)
 
-    @property
+    @cached_property
     def steps(self) -> int:
         """Number of control steps of a time-indexed run."""
         return steps_in(self.duration, self.dt)
+
+    @cached_property
+    def targets(self) -> list[tuple[Any, Any]]:
+        """Placement (`pinocchio.SE3`) and body twist (`pinocchio.Motion`) of the reference before
+        each step of a time-indexed run, and after the last; the same for every law."""
+        return [self.target(k * self.dt) for k in range(self.steps + 1)]
+
+    def target(self, tau: float) -> tuple[Any, Any]:
+        """Placement and body twist of the reference at a nominal time [s]."""
+        return self.reference.placement(tau), pin.Motion(self.reference.velocity(tau))
+
+    @cached_property
+    def target_arrays(self) -> tuple[Array, Array]:
+        """Rotations (n + 1, 3, 3) and translations (n + 1, 3) of `targets`."""
+        rotations = np.array([X.rotation for X, _ in self.targets])
+        return rotations, np.array([X.translation for X, _ in self.targets])

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from time import perf_counter_ns
+from typing import Literal
 
 import numpy as np
 import pinocchio as pin
@@ -16,6 +17,7 @@ from dikbench.problem import DikProblem, Formulation
 from dikbench.progress import STUCK_PROGRESS, progress, row_weights
 from dikbench.scenario import Scenario
 from dikbench.solvers.checked import CheckedSolve
+from dikbench.solvers.recheck import Verdicts
 from dikbench.status import STEP_CODE, Status
 from dikbench.tasks import PoseTask
 from dikbench.trace import Trace
@@ -43,11 +45,15 @@ class Run:
         trace: what happened, up to the end.
         status: `ok` if the run came to its end, else what ended it.
         message: the reason, with the step at which it happened; empty for `ok`.
+        kinematics_ns: time in kinematics and in setting up the problems, over all steps [ns].
+        law_ns: time in the law, its solver included [ns].
     """
 
     trace: Trace
     status: Status
     message: str
+    kinematics_ns: int
+    law_ns: int
 
 
 class _Recorder:
@@ -56,24 +62,22 @@ class _Recorder:
     def __init__(self, scenario: Scenario, steps: int) -> None:
         n, nv, m = steps, scenario.robot.nv, len(scenario.robot.task_rows)
         self.q = np.empty((n + 1, scenario.robot.nq))
-        self.tau = np.empty(n + 1)
+        self.tau = np.arange(n + 1) * scenario.dt
         self.wanted = np.empty((n, m))
         self.task_jacobian = np.empty((n, m, nv))
         self.commanded = np.empty((n, nv))
         self.applied = np.empty((n, nv))
-        self.status = np.zeros(n, dtype=int)
+        self.status = np.full(n, STEP_CODE[Status.OK])
         self.relaxed = np.zeros(n, dtype=int)
-        self.residuals = np.zeros((n, 4))
 
-    def trace(self, scenario: Scenario, n: int) -> Trace:
+    def trace(self, scenario: Scenario, n: int, verdicts: Verdicts) -> Trace:
         """The trace of the first n steps; steps that went nowhere become `stuck`."""
         achieved = np.einsum("kij,kj->ki", self.task_jacobian[:n], self.commanded[:n])
         alpha = progress(self.wanted[:n], achieved, row_weights(scenario.robot.task_rows))
-        status = self.status[:n].copy()
-        status[(status == STEP_CODE[Status.OK]) & (alpha < STUCK_PROGRESS)] = STEP_CODE[
-            Status.STUCK
-        ]
-        primal, dual, gap, distance = self.residuals[:n].T
+        status, ok = self.status[:n].copy(), STEP_CODE[Status.OK]
+        lied = (verdicts.claimed[:n] == 1) & (verdicts.verified[:n] == 0)
+        status[(status == ok) & lied] = STEP_CODE[Status.NOT_VERIFIED]
+        status[(status == ok) & (alpha < STUCK_PROGRESS)] = STEP_CODE[Status.STUCK]
         return Trace(
             scenario.dt,
             self.q[: n + 1],
@@ -83,10 +87,12 @@ class _Recorder:
             self.applied[:n],
             status,
             self.relaxed[:n],
-            primal.copy(),
-            dual.copy(),
-            gap.copy(),
-            distance.copy(),
+            verdicts.claimed[:n],
+            verdicts.verified[:n],
+            verdicts.primal[:n],
+            verdicts.dual[:n],
+            verdicts.gap[:n],
+            verdicts.distance[:n],
         )
 
 
@@ -109,58 +115,81 @@ def simulate(
     Returns:
         The trace and how the run ended; failures of the law are statuses, never exceptions.
     """
-    robot, dt, reference = scenario.robot, scenario.dt, scenario.reference
-    model, rows = robot.model, row_weights(robot.task_rows)
+    robot, dt = scenario.robot, scenario.dt
+    model, limits_at = robot.model, robot.limits.at
     steps = scenario.steps * (LONGEST if mode == "path" else 1)
-    targets = _time_indexed(scenario) if mode == "time" else None
+    targets = scenario.targets if mode == "time" else None
+    clock = _PathClock(scenario)
     record = _Recorder(scenario, steps)
+    qs, wanted, jacobians = record.q, record.wanted, record.task_jacobian
+    commanded, applied_velocities = record.commanded, record.applied
     kinematics, tracking = Kinematics(robot), PoseTask(gain=scenario.gain)
-    q, v_prev, tau, k = scenario.q0, scenario.v0, 0.0, 0
+    q, v_prev, k = scenario.q0, scenario.v0, 0
+    kinematics_ns = law_ns = 0
     status, message = Status.OK, ""
+    solve.begin_run(steps)
     try:
         for k in range(steps):
             if targets is not None:
-                tau = k * dt
                 target, twist = targets[k]
-            elif tau >= reference.duration * (1 - ROUNDING):
+            elif clock.is_over:
                 break
             else:
-                target, twist = reference.placement(tau), reference.velocity(tau)
+                target, twist = scenario.target(clock.tau)
+                record.tau[k] = clock.tau
+            start = perf_counter_ns()
             kinematics.update(q)
             task = tracking.linearize(kinematics, target, twist)
             tasks = [task, *[secondary.linearize(kinematics) for secondary in scenario.tasks]]
-            limits = robot.limits.at(q)
-            record.q[k], record.tau[k], record.wanted[k] = q, tau, task.V
-            record.task_jacobian[k] = task.J
-            if task.error @ task.error > FARTHEST**2:
-                raise TrialEnded(Status.DIVERGED, f"task error above {FARTHEST:g} m, rad")
+            limits = limits_at(q)
             problem = DikProblem(robot, q, v_prev, dt, tasks, limits)
-            outcome = control_step(formulation, problem, solve)
+            kinematics_ns += perf_counter_ns() - start
+            qs[k], wanted[k], jacobians[k] = q, task.V, task.J
+            if task.error.dot(task.error) > FARTHEST**2:
+                raise TrialEnded(Status.DIVERGED, f"task error above {FARTHEST:g} m, rad")
+            outcome = control_step(formulation, problem, solve, k)
+            law_ns += outcome.law_ns
             v = outcome.velocity
-            if np.abs(v).max() > FASTEST:
+            if outcome.square > FASTEST**2:
                 raise TrialEnded(Status.DIVERGED, f"commanded speed above {FASTEST:g} rad/s")
             applied = plant(v, limits, dt)
-            record.commanded[k], record.applied[k] = v, applied
-            record.status[k] = STEP_CODE[outcome.status]
-            record.relaxed[k] = problem.relaxed
-            record.residuals[k] = solve.primal, solve.dual, solve.gap, solve.distance
+            commanded[k], applied_velocities[k] = v, applied
+            if outcome.status is not Status.OK:
+                record.status[k] = STEP_CODE[outcome.status]
+            if problem.relaxed:
+                record.relaxed[k] = problem.relaxed
             if targets is None:
-                alpha = progress(task.V[None], (task.J @ applied)[None], rows)[0]
-                tau += dt * (1.0 if np.isnan(alpha) else min(max(float(alpha), 0.0), 1.0))
-                tau = min(tau, reference.duration)
+                clock.advance(task.V, task.J @ applied)
             q = pin.integrate(model, q, applied * dt)
             v_prev = applied
         else:
             k = steps
     except TrialEnded as ended:
         status, message = ended.status, f"step {k}: {ended}"
-    record.q[k], record.tau[k] = q, tau if targets is None else k * dt
-    return Run(record.trace(scenario, k), status, message)
+    qs[k] = q
+    if targets is None:
+        record.tau[k] = clock.tau
+    return Run(
+        record.trace(scenario, k, solve.verdicts()), status, message, kinematics_ns, law_ns
+    )
 
 
-def _time_indexed(scenario: Scenario) -> list[tuple[Any, Array]]:
-    """Placement and body twist of the reference at every control step."""
-    reference, dt = scenario.reference, scenario.dt
-    return [
-        (reference.placement(k * dt), reference.velocity(k * dt)) for k in range(scenario.steps)
-    ]
+class _PathClock:
+    """The nominal time of a path-indexed run, which moves on with the progress achieved."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.tau = 0.0
+        self._duration = scenario.reference.duration
+        self._dt = scenario.dt
+        self._weights = row_weights(scenario.robot.task_rows)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the path is at its end, but for rounding."""
+        return self.tau >= self._duration * (1 - ROUNDING)
+
+    def advance(self, wanted: Array, achieved: Array) -> None:
+        """Move on by the share of the wanted motion that was made; a dwell passes in full."""
+        alpha = float(progress(wanted[None], achieved[None], self._weights)[0])
+        share = 1.0 if np.isnan(alpha) else min(max(alpha, 0.0), 1.0)
+        self.tau = min(self.tau + self._dt * share, self._duration)

@@ -67,7 +67,11 @@ class _Asked:
             return _Answer(None, ended.status, str(ended), 0.0)
         if outcome.status in {Status.INFEASIBLE, Status.SOLVER_FAILED}:
             return _Answer(None, outcome.status, outcome.status.sentence, 0.0)
-        return _Answer(outcome.velocity, outcome.status, outcome.status.sentence, solve.primal)
+        verdicts = solve.verdicts()
+        lied = verdicts.claimed[0] == 1 and verdicts.verified[0] == 0
+        status = Status.NOT_VERIFIED if lied else outcome.status
+        residual = float(verdicts.primal[0])
+        return _Answer(outcome.velocity, status, status.sentence, residual)
 
     def verified(self) -> Iterator[tuple[State, Array, float]]:
         """Every state with an answer to judge: state, velocity, tolerance [rad/s].

@@ -25,6 +25,8 @@ class Trace:
         applied: what the plant made of it, (n, nv) [rad/s].
         status: codes of `STEP_STATUSES`, (n,).
         relaxed: joints whose acceleration bound was given up, (n,).
+        claimed, verified: what the solver said of the step's programs and what the recheck says, 1
+            or 0; -1 where nothing was solved, (n,) each (see `Verdicts`).
         primal, dual, gap: largest residuals of the step's programs, (n,) (see `Residuals`).
         distance: their largest distance from the optimum, (n,) [rad/s].
     """
@@ -37,6 +39,8 @@ class Trace:
     applied: Array
     status: Indices
     relaxed: Indices
+    claimed: Indices
+    verified: Indices
     primal: Array
     dual: Array
     gap: Array

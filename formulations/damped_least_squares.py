@@ -40,10 +40,10 @@ class DampedLeastSquares:
         """See `Formulation`."""
         task = problem.primary
         J = task.J
-        damped = J @ J.T
+        damped = J.dot(J.T)
         damped.flat[:: len(damped) + 1] += self.damping**2
         y = solve_positive_definite(damped, task.V)
         if y is None:  # (almost) no damping, at a singularity
             v: Array = pseudo_inverse(J, np.finfo(float).eps) @ task.V
             return v
-        return J.T @ y
+        return y.dot(J)

@@ -54,17 +54,11 @@ class WeightedQp:
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
-        n = problem.robot.nv
-        P = np.zeros((n, n))
-        P.flat[:: n + 1] = self.damping**2
-        q = np.zeros(n)
-        for task in problem.tasks:
-            J, V = task.J, task.V
-            Jl = task.log_derivative if self.log_derivative else None
-            if Jl is not None:
-                J, V = Jl @ J, Jl @ V
-            weighted = J.T * task.weight
-            P += weighted @ J
-            q -= weighted @ V
+        P, wanted = problem.tasks[0].normal_equations(log_derivative=self.log_derivative)
+        for task in problem.tasks[1:]:
+            more_P, more_wanted = task.normal_equations(log_derivative=self.log_derivative)
+            P += more_P
+            wanted += more_wanted
+        P.flat[:: len(P) + 1] += self.damping**2
         box = problem.box(self.braking, self.position_gain)
-        return solve(QuadraticProgram(P, q, lb=box.lower, ub=box.upper))
+        return solve(QuadraticProgram(P, -wanted, lb=box.lower, ub=box.upper))

@@ -13,9 +13,11 @@ import msgspec
 from dikbench.errors import DikbenchError, unknown
 from dikbench.quadratic_program import Program
 from dikbench.selector import Selector, parse_selector
+from dikbench.solvers.presets import TOLERANCES, Preset, preset_settings
 
-Interface = Literal["cold", "cvxpy"]
+Interface = Literal["cold", "warm", "cvxpy"]
 INTERFACES: Final = get_args(Interface)
+PRESETS: Final = get_args(Preset)
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ BACK_ENDS: Mapping[str, BackEnd] = MappingProxyType(
             "osqp",
             "osqp",
             _QP_AND_LP,
-            ("cold", "cvxpy"),
+            ("cold", "warm", "cvxpy"),
             {"eps_abs": float, "eps_rel": float, "max_iter": int, "polishing": bool},
         ),
         "clarabel": BackEnd(
@@ -61,7 +63,7 @@ BACK_ENDS: Mapping[str, BackEnd] = MappingProxyType(
             "clarabel",
             "clarabel",
             _QP_AND_LP,
-            ("cold", "cvxpy"),
+            ("cold", "warm", "cvxpy"),
             {"tol_feas": float, "tol_gap_abs": float, "tol_gap_rel": float, "max_iter": int},
         ),
         "piqp": BackEnd(
@@ -69,7 +71,7 @@ BACK_ENDS: Mapping[str, BackEnd] = MappingProxyType(
             "piqp",
             "piqp",
             _QP_AND_LP,
-            ("cold",),
+            ("cold", "warm"),
             {"eps_abs": float, "eps_rel": float, "max_iter": int},
         ),
         "proxqp": BackEnd(
@@ -77,7 +79,7 @@ BACK_ENDS: Mapping[str, BackEnd] = MappingProxyType(
             "proxsuite",
             "proxsuite",
             _QP_ONLY,
-            ("cold",),
+            ("cold", "warm"),
             {"eps_abs": float, "eps_rel": float, "max_iter": int},
             no_lp="through qpsolvers it fails on linear programs",
         ),
@@ -86,7 +88,7 @@ BACK_ENDS: Mapping[str, BackEnd] = MappingProxyType(
             "daqp",
             "daqp",
             _QP_AND_LP,
-            ("cold",),
+            ("cold", "warm"),
             {"primal_tol": float, "dual_tol": float, "iter_limit": int},
         ),
         "highs": BackEnd(
@@ -94,7 +96,7 @@ BACK_ENDS: Mapping[str, BackEnd] = MappingProxyType(
             "highspy",
             "highspy",
             _QP_AND_LP,
-            ("cold", "cvxpy"),
+            ("cold", "warm", "cvxpy"),
             {
                 "primal_feasibility_tolerance": float,
                 "dual_feasibility_tolerance": float,
@@ -131,11 +133,15 @@ DEFAULT_SOLVER: Final[Mapping[Program, str]] = MappingProxyType(
 
 @dataclass(frozen=True)
 class Solver:
-    """A back end, how it is called, and its settings (those not named are the library's)."""
+    """A back end, how it is called, and its settings (those not named are the library's).
+
+    `tolerance` is the largest residual of a verified answer, as its preset says.
+    """
 
     name: str
     interface: Interface
     settings: Mapping[str, Any]
+    tolerance: float = TOLERANCES["default"]
 
 
 def is_installed(name: str) -> bool:
@@ -144,10 +150,12 @@ def is_installed(name: str) -> bool:
 
 
 def parse_solver(text: str) -> Solver:
-    """Read a selector such as `osqp`, `osqp[eps_abs=1e-6]` or `clarabel[interface=cvxpy]`.
+    """Read a selector such as `osqp`, `osqp[preset=high]` or `clarabel[interface=warm]`.
+
+    A setting that is named beside a preset goes before the preset's.
 
     Raises:
-        DikbenchError: on an unknown solver, interface or setting, a value of the wrong type, or
+        DikbenchError: on an unknown solver, interface, preset or setting, a value of the wrong type, or
             a solver that is not installed.
     """
     selector = parse_selector(text)
@@ -162,7 +170,15 @@ def parse_solver(text: str) -> Solver:
     interface = parameters.pop("interface", back_end.interfaces[0])
     if interface not in back_end.interfaces:
         raise unknown(f"interface of solver {selector.name}", interface, back_end.interfaces)
-    return Solver(selector.name, interface, _settings(back_end, selector, parameters))
+    preset: Any = parameters.pop("preset", "default")
+    if preset not in PRESETS:
+        raise unknown(f"preset of solver {selector.name}", preset, PRESETS)
+    settings = {
+        **back_end.ours,
+        **preset_settings(selector.name, preset),
+        **_settings(back_end, selector, parameters),
+    }
+    return Solver(selector.name, interface, MappingProxyType(settings), TOLERANCES[preset])
 
 
 def why_not(solver: Solver, program: Program) -> str:
@@ -181,10 +197,10 @@ def why_not(solver: Solver, program: Program) -> str:
 def _settings(
     back_end: BackEnd, selector: Selector, parameters: Mapping[str, str]
 ) -> Mapping[str, Any]:
-    settings = dict(back_end.ours)
+    settings = {}
     for key, text in parameters.items():
         if key not in back_end.settings:
-            valid = ("interface", *back_end.settings)
+            valid = ("interface", "preset", *back_end.settings)
             raise unknown(f"setting of solver {selector.name}", key, valid)
         kind = back_end.settings[key]
         try:
@@ -199,4 +215,4 @@ def _settings(
                 f"solver {selector.name}: {key} must be finite and at least {least}, got {text!r}"
             )
         settings[key] = value
-    return MappingProxyType(settings)
+    return settings

@@ -1,10 +1,10 @@
-"""The `solve` that is handed to a law: timed, counted, its answers rechecked."""
+"""The `solve` that is handed to a law: timed, counted, its answers rechecked off the clock."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from time import perf_counter_ns
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -15,10 +15,15 @@ from dikbench.quadratic_program import Program, QuadraticProgram
 from dikbench.solvers.answer import Answer
 from dikbench.solvers.catalogue import Solver
 from dikbench.solvers.feasibility import is_feasible
-from dikbench.solvers.residuals import residuals
+from dikbench.solvers.recheck import Solved, Verdicts
+from dikbench.solvers.presets import TOLERANCES
 
-VERIFIED_DISTANCE = 1e-2
-"""The largest distance from the optimum of a verified answer [rad/s; alpha for alpha scaling]."""
+BATCH: Final = 512
+"""Answers that wait for their recheck: many, since they are rechecked at once; not the whole run,
+since each keeps its program."""
+
+BackEnd = Callable[[Any, int], Answer]
+"""(program, number of the call within its step) -> answer."""
 
 
 class CheckedSolve:
@@ -28,76 +33,81 @@ class CheckedSolve:
         calls: number of programs solved.
         solve_ns: time inside the solver and its interface [ns].
         core_ns: the solver library's own share of it [ns].
-        checking_ns: time spent on rechecking, which belongs to nobody's clock [ns].
-        primal, dual, gap: the largest residuals of the step (see `residuals`); NaN where one is
-            not known.
-        distance: largest distance from the optimum (see `distance_to_optimum`); NaN where it is
-            not known.
-        verified: whether every answer that claimed success was within tolerance.
+        checking_ns: time spent on deciding why there is no answer, which is on nobody's clock [ns].
     """
 
     __slots__ = (
         "_back_end",
         "_checks",
+        "_solved",
+        "_step",
+        "_tolerance",
+        "_verdicts",
         "calls",
         "checking_ns",
         "core_ns",
-        "distance",
-        "dual",
-        "gap",
-        "primal",
         "solve_ns",
-        "verified",
     )
 
-    def __init__(self, back_end: Callable[[Any], Answer], *, checks: bool = True) -> None:
+    def __init__(
+        self, back_end: BackEnd, *, tolerance: float = TOLERANCES["default"], checks: bool = True
+    ) -> None:
         self._back_end = back_end
+        self._tolerance = tolerance
         self._checks = checks
-        self.begin_step()
+        self._solved: list[Solved] = []
+        self._verdicts = Verdicts(0)
+        self.begin_run(1)
+        self.begin_step(0)
 
-    def begin_step(self) -> None:
-        """Forget the records of the step before."""
+    def begin_run(self, steps: int) -> None:
+        """Forget everything, and make room for the verdicts on so many control steps."""
+        self._solved.clear()
+        self._verdicts = Verdicts(steps)
+
+    def begin_step(self, step: int) -> None:
+        """Forget the records of the step before; its programs are kept for the recheck."""
+        self._step = step
         self.calls = 0
         self.solve_ns = 0
         self.core_ns = 0
         self.checking_ns = 0
-        self.primal = 0.0
-        self.dual = 0.0
-        self.gap = 0.0
-        self.distance = 0.0
-        self.verified = True
+        if len(self._solved) >= BATCH:
+            self._judge()
+
+    def verdicts(self) -> Verdicts:
+        """What the recheck says of the run so far."""
+        self._judge()
+        return self._verdicts
+
+    def _judge(self) -> None:
+        self._verdicts.judge(self._solved, self._tolerance)
+        self._solved.clear()
 
     def __call__(self, program: QuadraticProgram | ModelledProgram) -> Array:
         """Solve a program (see `Solve`)."""
         start = perf_counter_ns()
-        answer = self._back_end(program)
+        answer = self._back_end(program, self.calls)
         solved = perf_counter_ns()
         self.calls += 1
         self.solve_ns += solved - start
         self.core_ns += answer.core_ns
+        if self._checks:
+            self._solved.append((self._step, program, answer))
+        x = answer.x
+        # One product says whether there is an x and whether it is finite.
+        if answer.claimed and x is not None and x.dot(x) < np.inf:
+            return x
         try:
-            return self._checked(program, answer)
+            self._refuse(program)
         finally:
             self.checking_ns += perf_counter_ns() - solved
 
-    def _checked(self, program: QuadraticProgram | ModelledProgram, answer: Answer) -> Array:
-        if not self._checks and answer.claimed and answer.x is not None:
-            return answer.x
+    def _refuse(self, program: QuadraticProgram | ModelledProgram) -> None:
         matrices = program.matrices() if isinstance(program, ModelledProgram) else program
-        if not answer.claimed or answer.x is None:
-            if is_feasible(matrices):
-                raise SolverFailed("the solver gave no answer to a feasible program")
-            raise Infeasible("the program has no feasible point")
-        found = residuals(matrices, answer)
-        self.primal = max(self.primal, found.primal)
-        self.dual = float(np.maximum(self.dual, found.dual))  # what is not known stays NaN
-        self.gap = float(np.maximum(self.gap, found.gap))
-        from dikbench.solvers.optimum import distance_to_optimum
-
-        distance = distance_to_optimum(matrices, answer)
-        self.distance = float(np.maximum(self.distance, distance))
-        self.verified = self.verified and found.verified and not distance > VERIFIED_DISTANCE
-        return answer.x
+        if not self._checks or is_feasible(matrices):
+            raise SolverFailed("the solver gave no answer to a feasible program")
+        raise Infeasible("the program has no feasible point")
 
 
 class NoSolve(CheckedSolve):
@@ -109,7 +119,7 @@ class NoSolve(CheckedSolve):
         super().__init__(_refuse)
 
 
-def _refuse(program: object) -> Answer:
+def _refuse(program: object, site: int) -> Answer:
     raise DikbenchError("the law called solve but declares no program; set program = 'qp' or 'lp'")
 
 
@@ -121,15 +131,22 @@ def make_solve(
     Args:
         solver: the solver of the trial, or None for a law that needs none.
         program: what the law solves (see `Program`).
-        checks: whether answers that claim success are rechecked (the timing pass does not, so that
-            every solver finds the caches as its law left them).
+        checks: whether answers are rechecked (the timing pass does not, so that every solver finds
+            the caches as its law left them).
     """
     if solver is None or program is None:
         return NoSolve()
+    back_end: BackEnd
     if program == "cvxpy" or solver.interface == "cvxpy":
         from dikbench.solvers.modelled import ModelledSolver
 
-        return CheckedSolve(ModelledSolver(solver), checks=checks)
-    from dikbench.solvers.cold import ColdSolver
+        back_end = ModelledSolver(solver)
+    elif solver.interface == "warm":
+        from dikbench.solvers.warm import WarmSolver
 
-    return CheckedSolve(ColdSolver(solver), checks=checks)
+        back_end = WarmSolver(solver)
+    else:
+        from dikbench.solvers.cold import ColdSolver
+
+        back_end = ColdSolver(solver)
+    return CheckedSolve(back_end, tolerance=solver.tolerance, checks=checks)

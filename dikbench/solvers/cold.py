@@ -26,7 +26,7 @@ warnings.filterwarnings("ignore", module=r"qpsolvers\.")
 
 
 class ColdSolver:
-    """A back end called afresh for every program."""
+    """A back end called afresh for every program, whatever its call site."""
 
     __slots__ = ("_name", "_settings", "_sparse")
 
@@ -35,7 +35,7 @@ class ColdSolver:
         self._settings = {**UNSAID.get(solver.name, {}), **solver.settings}
         self._sparse = solver.name in SPARSE
 
-    def __call__(self, program: QuadraticProgram) -> Answer:
+    def __call__(self, program: QuadraticProgram, site: int = 0) -> Answer:
         """Solve a program; a failure of any kind is an answer that claims nothing."""
         G, h = program.G, program.h
         if self._name == "highs" and G is None and program.A is None:

@@ -31,7 +31,7 @@ class ModelledSolver:
         options = {"solver": solver.name.upper(), "warm_start": False}
         self._options: dict[str, Any] = {**options, **solver.settings}
 
-    def __call__(self, program: QuadraticProgram | ModelledProgram) -> Answer:
+    def __call__(self, program: QuadraticProgram | ModelledProgram, site: int = 0) -> Answer:
         """Solve a program; a failure of any kind is an answer that claims nothing."""
         if isinstance(program, ModelledProgram):
             model, unknowns = program.model, program.unknowns

@@ -1,7 +1,8 @@
-"""How far an answer is from the optimum, which residuals cannot say near a singularity."""
+"""How far answers are from the optimum, which residuals cannot say near a singularity."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -12,6 +13,7 @@ from dikbench.solvers.answer import Answer
 from dikbench.solvers.catalogue import Solver
 from dikbench.solvers.cold import ColdSolver
 from dikbench.solvers.residuals import residuals
+from dikbench.solvers.stack import Stack
 
 JUDGE: Final = Solver("daqp", "cold", {})
 """An active-set method: where it answers it answers to rounding, and its own answer is checked."""
@@ -23,27 +25,45 @@ program."""
 EXACT_COST: Final = 1e-4
 """The same for other programs, of which only the cost is compared: the judge smooths them."""
 
+PROVEN: Final = 1e-4
+"""A distance up to which the residuals themselves are proof enough, and no judge is asked."""
 
-def distance_to_optimum(program: QuadraticProgram, answer: Answer) -> float:
-    """Distance of an answer's x from the optimum, found by a solver of our own choice.
+
+def distance_to_optimum(
+    programs: Sequence[QuadraticProgram], answers: Sequence[Answer], nearness: Array
+) -> Array:
+    """Distance of each answer's x from the optimum.
 
     Where P is positive definite the optimum x* is unique and this is max |x - x*| [rad/s]: near a
     singularity the cost is so flat that small residuals allow wrong velocities. Elsewhere it is the
     difference in cost (for alpha scaling: in alpha).
 
+    Args:
+        programs: k of them.
+        answers: to them, all with an x.
+        nearness: a bound on the distance (see `Residuals`), (k,); where it is small it is taken for
+            the distance, elsewhere a solver of our own choice is asked.
+
     Returns:
-        The distance; NaN where the judge has no answer to trust.
+        The distances, (k,); NaN where the judge has no answer to trust.
     """
-    assert answer.x is not None
-    judged = ColdSolver(JUDGE)(program)
-    if not judged.claimed or judged.x is None:
-        return float("nan")
-    found = residuals(program, judged)
-    worst = max(found.primal, found.dual, found.gap)
-    if _is_positive_definite(program.P):
-        return float(np.abs(answer.x - judged.x).max()) if worst <= EXACT else float("nan")
-    cost, best = (0.5 * x @ program.P @ x + program.q @ x for x in (answer.x, judged.x))
-    return float(abs(cost - best)) if worst <= EXACT_COST else float("nan")
+    distance = np.where(nearness <= PROVEN, nearness, np.nan)
+    judge = ColdSolver(JUDGE)
+    for k in np.flatnonzero(np.isnan(distance)):
+        program, x = programs[k], answers[k].x
+        assert x is not None
+        judged = judge(program)
+        if not judged.claimed or judged.x is None:
+            continue
+        found = residuals(Stack([program], [judged]))
+        worst = float(max(found.primal[0], found.dual[0], found.gap[0]))
+        if _is_positive_definite(program.P):
+            if worst <= EXACT:
+                distance[k] = np.abs(x - judged.x).max()
+        elif worst <= EXACT_COST:
+            cost, best = (0.5 * p @ program.P @ p + program.q @ p for p in (x, judged.x))
+            distance[k] = abs(cost - best)
+    return distance
 
 
 def _is_positive_definite(P: Array) -> bool:

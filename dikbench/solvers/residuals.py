@@ -1,21 +1,14 @@
-"""How far an answer is from solving its program, recomputed by us."""
+"""How far answers are from solving their programs, recomputed by us."""
 
 from __future__ import annotations
-
-from typing import Final
 
 import numpy as np
 
 from dikbench.array import Array
-from dikbench.quadratic_program import QuadraticProgram
-from dikbench.solvers.answer import Answer
-
-VERIFIED_TOLERANCE: Final = 1e-3
-"""The largest residual of a verified answer: primal in rad/s and m/s, dual and gap as scaled."""
-
+from dikbench.solvers.stack import Stack
 
 class Residuals:
-    """Residuals of an answer.
+    """Residuals of k answers, (k,) each.
 
     Attributes:
         primal: largest violation of an equality, inequality or bound [rad/s, m/s].
@@ -23,72 +16,118 @@ class Residuals:
             sign, over max(1, largest entry of P), a gradient of the cost; NaN where the interface
             gives no multipliers.
         gap: |x^T P x + q^T x + h^T z + b^T y + ub^T z_box+ + lb^T z_box-|, on the same scale.
+        nearness: a bound on the distance from the optimum that follows from them to first order
+            (see `optimum`): max |x - x*| [rad/s] where P is positive definite, the difference in
+            cost elsewhere; infinite where nothing follows.
     """
 
-    __slots__ = ("dual", "gap", "primal")
+    __slots__ = ("dual", "gap", "nearness", "primal")
 
-    def __init__(self, primal: float, dual: float, gap: float) -> None:
+    def __init__(self, primal: Array, dual: Array, gap: Array, nearness: Array) -> None:
         self.primal = primal
         self.dual = dual
         self.gap = gap
+        self.nearness = nearness
 
-    @property
-    def verified(self) -> bool:
-        """Whether every residual that is known is within tolerance."""
-        return not any(r > VERIFIED_TOLERANCE for r in (self.primal, self.dual, self.gap))
+    def within(self, tolerance: float) -> Array:
+        """Whether every residual that is known is within a tolerance, (k,)."""
+        beyond: Array = (
+            (self.primal > tolerance) | (self.dual > tolerance) | (self.gap > tolerance)
+        )
+        return ~beyond
 
 
-def residuals(program: QuadraticProgram, answer: Answer) -> Residuals:
-    """Recompute the residuals of an answer that has an x.
+def residuals(stack: Stack) -> Residuals:
+    """Recompute the residuals of answers.
 
-    A relaxed bound that is infinite constrains nothing and carries no multiplier.
+    A bound that is infinite constrains nothing and carries no multiplier.
     """
-    x = answer.x
-    assert x is not None
-    primal = _primal(program, x)
-    if (
-        (program.A is not None and answer.y is None)
-        or (program.G is not None and answer.z is None)
-        or ((program.lb is not None or program.ub is not None) and answer.z_box is None)
-    ):
-        return Residuals(primal, float("nan"), float("nan"))
-    Px = program.P @ x
-    gradient = Px + program.q
-    gap = float(x @ gradient)
-    wrong_sign = 0.0
-    if program.A is not None and program.b is not None and answer.y is not None:
-        gradient = gradient + program.A.T @ answer.y
-        gap += float(program.b @ answer.y)
-    if program.G is not None and program.h is not None and answer.z is not None:
-        gradient = gradient + program.G.T @ answer.z
-        finite = np.isfinite(program.h)
-        gap += float(program.h[finite] @ answer.z[finite])
-        wrong_sign = float(np.max(-answer.z, initial=0.0))
-        wrong_sign = max(wrong_sign, float(np.max(np.abs(answer.z[~finite]), initial=0.0)))
-    if answer.z_box is not None and (program.lb is not None or program.ub is not None):
-        gradient = gradient + answer.z_box
-        for bound, push in (
-            (program.ub, np.maximum(answer.z_box, 0.0)),
-            (program.lb, np.minimum(answer.z_box, 0.0)),
-        ):
-            finite = np.zeros(len(push), dtype=bool) if bound is None else np.isfinite(bound)
-            if bound is not None:
-                gap += float(bound[finite] @ push[finite])
-            # Nothing can push at a bound that is not there.
-            wrong_sign = max(wrong_sign, float(np.max(np.abs(push[~finite]), initial=0.0)))
-    scale = max(1.0, float(np.abs(program.P).max()))
-    dual = max(float(np.abs(gradient).max()), wrong_sign) / scale
-    return Residuals(primal, dual, abs(gap) / scale)
+    primal = _primal(stack)
+    if not stack.explained:
+        unknown = np.full(len(stack.x), np.nan)
+        return Residuals(primal, unknown, unknown, np.full(len(stack.x), np.inf))
+    Px = np.einsum("kij,kj->ki", stack.P, stack.x)
+    gradient = Px + stack.q
+    gap = _dots(stack.x, gradient)
+    wrong_sign = pushing = np.zeros(len(stack.x))
+    if stack.A is not None and stack.b is not None and stack.y is not None:
+        gradient = gradient + np.einsum("kij,ki->kj", stack.A, stack.y)
+        gap = gap + _dots(stack.b, stack.y)
+        pushing = pushing + np.abs(stack.y).sum(axis=1)
+    for bound, push in _one_sided(stack):
+        gap = gap + _dots(np.where(np.isfinite(bound), bound, 0.0), push)
+        # Nothing can push at a bound that is not there.
+        vain = np.where(np.isfinite(bound), 0.0, np.abs(push)).max(axis=1, initial=0.0)
+        wrong_sign = np.maximum(wrong_sign, vain)
+        pushing = pushing + np.abs(push).sum(axis=1)
+    if stack.z_box is not None:
+        gradient = gradient + stack.z_box
+    if stack.G is not None and stack.z is not None:
+        gradient = gradient + np.einsum("kij,ki->kj", stack.G, stack.z)
+        wrong_sign = np.maximum(wrong_sign, (-stack.z).max(axis=1, initial=0.0))
+    scale = np.maximum(1.0, np.abs(stack.P).max(axis=(1, 2)))
+    dual = np.maximum(np.abs(gradient).max(axis=1), wrong_sign)
+    slack = np.abs(gap - _dots(stack.x, gradient)) + 2 * primal * pushing
+    nearness = np.where(wrong_sign > 0, np.inf, _nearness(stack, gradient, slack))
+    return Residuals(primal, dual / scale, np.abs(gap) / scale, nearness)
 
 
-def _primal(program: QuadraticProgram, x: Array) -> float:
-    worst = 0.0
-    if program.A is not None and program.b is not None:
-        worst = float(np.abs(program.A @ x - program.b).max(initial=0.0))
-    if program.G is not None and program.h is not None:
-        worst = max(worst, float((program.G @ x - program.h).max(initial=0.0)))
-    if program.lb is not None:
-        worst = max(worst, float((program.lb - x).max()))
-    if program.ub is not None:
-        worst = max(worst, float((x - program.ub).max()))
+def _one_sided(stack: Stack) -> list[tuple[Array, Array]]:
+    """The inequalities and bounds with their multipliers, (k, .) each."""
+    pairs = []
+    if stack.h is not None and stack.z is not None:
+        pairs.append((stack.h, stack.z))
+    if stack.z_box is not None:
+        nothing = np.full_like(stack.x, np.inf)
+        up, down = np.maximum(stack.z_box, 0.0), np.minimum(stack.z_box, 0.0)
+        pairs.append((nothing if stack.ub is None else stack.ub, up))
+        pairs.append((-nothing if stack.lb is None else stack.lb, down))
+    return pairs
+
+
+def _nearness(stack: Stack, gradient: Array, slack: Array) -> Array:
+    """With r the gradient that is left over and s the slack (both as they are, not scaled):
+
+        P positive definite:  mu |x - x*|^2 <= |x - x*| |r| + s,   mu its smallest eigenvalue
+        elsewhere:            cost - cost* <= |r|_1 max |x - x*| + s
+    """
+    definite = np.all(np.diagonal(stack.P, axis1=1, axis2=2) > 0, axis=1)
+    bound = np.full(len(stack.x), np.inf)
+    if definite.any():
+        P = stack.P[definite]
+        try:
+            np.linalg.cholesky(P)
+            softness = np.linalg.norm(np.linalg.inv(P), axis=(1, 2))  # at least 1/mu
+        except np.linalg.LinAlgError:  # one of them is not; the judge looks at each
+            softness = np.full(len(P), np.inf)
+        size = np.linalg.norm(gradient[definite], axis=1)
+        with np.errstate(invalid="ignore"):
+            found = size * softness + np.sqrt(slack[definite] * softness)
+        bound[definite] = np.where(np.isnan(found), np.inf, found)
+    if not definite.all() and stack.lb is not None and stack.ub is not None:
+        width = (stack.ub - stack.lb)[~definite].max(axis=1)
+        size = np.abs(gradient[~definite]).sum(axis=1)
+        with np.errstate(invalid="ignore"):
+            found = size * width + slack[~definite]
+        bound[~definite] = np.where(np.isnan(found), np.inf, found)
+    return bound
+
+
+def _dots(a: Array, b: Array) -> Array:
+    found: Array = np.einsum("ki,ki->k", a, b)
+    return found
+
+
+def _primal(stack: Stack) -> Array:
+    x, worst = stack.x, np.zeros(len(stack.x))
+    if stack.A is not None and stack.b is not None:
+        off = np.abs(np.einsum("kij,kj->ki", stack.A, x) - stack.b)
+        worst = off.max(axis=1, initial=0.0)
+    if stack.G is not None and stack.h is not None:
+        excess = np.einsum("kij,kj->ki", stack.G, x) - stack.h
+        worst = np.maximum(worst, excess.max(axis=1, initial=0.0))
+    if stack.lb is not None:
+        worst = np.maximum(worst, (stack.lb - x).max(axis=1))
+    if stack.ub is not None:
+        worst = np.maximum(worst, (x - stack.ub).max(axis=1))
     return worst

@@ -40,14 +40,14 @@ class PoseTask:
     frame: str | None = None
 
     def linearize(
-        self, kinematics: Kinematics, target: Any = None, velocity: Array | None = None
+        self, kinematics: Kinematics, target: Any = None, velocity: Any = None
     ) -> LinearizedTask:
         """The task at the configuration of `kinematics`.
 
         Args:
             kinematics: the robot at its configuration.
             target: this step's placement; default: the task's own.
-            velocity: the target's body twist V_d, (6,), or None for a target at rest.
+            velocity: the target's body twist V_d (`pinocchio.Motion`); None: at rest.
         """
         robot = kinematics.robot
         index = robot.frame_id if self.frame is None else frame_id(robot.model, self.frame)
@@ -60,7 +60,7 @@ class PoseTask:
         error: Array = pin.log6(relative).np
         V = self.gain * error
         if velocity is not None:
-            V = V + relative.toActionMatrix() @ velocity
+            V += relative.act(velocity).np
         J = kinematics.jacobian(index)
         if len(robot.task_rows) == 6:
             return LinearizedPose(J, V, error, self.weight, self.priority, relative, None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import pinocchio as pin
@@ -47,9 +48,26 @@ class PostureTask:
         if shape != (robot.nq,):
             raise DikbenchError(f"posture task: expected shape ({robot.nq},), got {shape}")
         error: Array = pin.difference(robot.model, kinematics.q, self.target)
-        return LinearizedTask(
-            np.eye(robot.nv), self.gain * error, error, self.weight, self.priority
+        return LinearizedPosture(
+            _identity(robot.nv), self.gain * error, error, self.weight, self.priority
         )
+
+
+class LinearizedPosture(LinearizedTask):
+    """A posture task at one configuration: J is the identity (shared: not to be written to)."""
+
+    __slots__ = ()
+
+    def normal_equations(self, *, log_derivative: bool = False) -> tuple[Array, Array]:
+        """W and W V (see `LinearizedTask`): nothing to multiply."""
+        return self.J * self.weight, self.V * self.weight
+
+
+@lru_cache(maxsize=16)
+def _identity(nv: int) -> Array:
+    identity = np.eye(nv)
+    identity.flags.writeable = False
+    return identity
 
 
 def middle_posture(robot: Robot) -> Array:

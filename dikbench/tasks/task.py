@@ -43,6 +43,19 @@ class LinearizedTask:
         """
         return None
 
+    def normal_equations(self, *, log_derivative: bool = False) -> tuple[Array, Array]:
+        """J^T W J, (nv, nv), and J^T W V, (nv,): the task's share of a least-squares cost.
+
+        Args:
+            log_derivative: whether to multiply J and V by the matrix of that name first.
+        """
+        J, V = self.J, self.V
+        Jl = self.log_derivative if log_derivative else None
+        if Jl is not None:
+            J, V = Jl @ J, Jl @ V
+        weighted = J.T if type(self.weight) is float and self.weight == 1.0 else J.T * self.weight
+        return weighted.dot(J), weighted.dot(V)
+
 
 class Task(Protocol):
     """What is wanted: a frozen dataclass with at least these fields."""

@@ -1,0 +1,58 @@
+"""Presets: one verified tolerance, said to each solver in its own words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any, Final, Literal
+
+Preset = Literal["default", "low", "mid", "high"]
+
+TOLERANCES: Final[Mapping[Preset, float]] = MappingProxyType(
+    {"default": 1e-3, "low": 1e-3, "mid": 1e-6, "high": 1e-8}
+)
+"""The largest residual of a verified answer under each preset: primal in rad/s and m/s, dual and
+gap as scaled (see `Residuals`). `default` leaves the library its own settings."""
+
+MARGIN: Final = 0.1
+"""Share of the tolerance that a solver is asked for: it measures in its own scaling."""
+
+FINEST: Final = 1e-10
+"""The smallest tolerance that HiGHS takes."""
+
+_SETTINGS: Final[Mapping[str, Callable[[float], Mapping[str, Any]]]] = MappingProxyType(
+    {
+        "osqp": lambda eps: {"eps_abs": eps, "eps_rel": 0.0, "max_iter": 100_000},
+        "clarabel": lambda eps: {"tol_feas": eps, "tol_gap_abs": eps, "tol_gap_rel": eps},
+        "piqp": lambda eps: {
+            "eps_abs": eps,
+            "eps_rel": 0.0,
+            "eps_duality_gap_abs": eps,
+            "eps_duality_gap_rel": 0.0,
+        },
+        "proxqp": lambda eps: {
+            "eps_abs": eps,
+            "eps_rel": 0.0,
+            "check_duality_gap": True,
+            "eps_duality_gap_abs": eps,
+            "eps_duality_gap_rel": 0.0,
+            "max_iter": 10_000,
+        },
+        # An active-set method is exact but where it smooths a linear program (eta_prox).
+        "daqp": lambda eps: {"primal_tol": eps, "dual_tol": 1e-12, "eta_prox": eps / 10},
+        "highs": lambda eps: {
+            "primal_feasibility_tolerance": max(eps, FINEST),
+            "dual_feasibility_tolerance": max(eps, FINEST),
+            "qp_regularization_value": 0.0,
+        },
+        "quadprog": lambda eps: {},  # exact, and without settings
+        "scs": lambda eps: {"eps_abs": eps, "eps_rel": 0.0, "max_iters": 1_000_000},
+    }
+)
+
+
+def preset_settings(solver: str, preset: Preset) -> Mapping[str, Any]:
+    """The settings of a solver under a preset."""
+    if preset == "default":
+        return {}
+    return _SETTINGS[solver](MARGIN * TOLERANCES[preset])
