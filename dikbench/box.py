@@ -146,9 +146,13 @@ class _Interior:
         self.slowest = self.fastest = None
         deceleration = np.full(joint.nv, np.inf), np.full(joint.nv, np.inf)
         if joint.acceleration is not None:
-            self.slowest, self.fastest = joint.acceleration.lower * dt, joint.acceleration.upper * dt
+            self.slowest, self.fastest = (
+                joint.acceleration.lower * dt,
+                joint.acceleration.upper * dt,
+            )
             deceleration = joint.acceleration.upper, -joint.acceleration.lower
-        self.above = self.below = None
+        self.above: Array | None = None
+        self.below: Array | None = None
         if joint.position is not None:
             with np.errstate(invalid="ignore", divide="ignore"):  # no limit is never far enough
                 below = _reach(upper, deceleration[1], dt, braking, gain)
@@ -158,7 +162,9 @@ class _Interior:
 
     def holds(self, coordinates: Array | None) -> bool:
         """Whether these coordinates (nv,) are inside; for so few, a list is faster than `all`."""
-        return self.above is None or not (
+        if self.above is None or self.below is None or coordinates is None:
+            return True
+        return not (
             False in (coordinates > self.above).tolist()
             or False in (coordinates < self.below).tolist()
         )

@@ -10,6 +10,8 @@ import pinocchio as pin
 from dikbench.array import Array
 from dikbench.robot import Robot
 
+LOCAL = pin.LOCAL  # looked up once: this is asked in every control step
+
 
 class Kinematics:
     """The robot at one configuration: placements and Jacobians of its frames.
@@ -38,7 +40,7 @@ class Kinematics:
 
     def jacobian(self, frame: int) -> Array:
         """Body Jacobian of a frame, (6, nv), rows (linear; angular) in the frame's own axes."""
-        J: Array = pin.getFrameJacobian(self._model, self._data, frame, pin.LOCAL)
+        J: Array = pin.getFrameJacobian(self._model, self._data, frame, LOCAL)
         return J
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from scipy.linalg.lapack import dgesdd, dposv
 
@@ -19,6 +21,14 @@ def pseudo_inverse(A: Array, tolerance: float) -> Array:
     inverse[kept] = 1.0 / singular[kept]
     result: Array = (Vt.T * inverse) @ U.T
     return result
+
+
+@lru_cache(maxsize=64)
+def scaled_identity(n: int, scale: float) -> Array:
+    """The matrix scale I, (n, n), made once: to be read, not written to."""
+    matrix: Array = np.eye(n) * scale
+    matrix.flags.writeable = False
+    return matrix
 
 
 def solve_positive_definite(A: Array, b: Array) -> Array | None:

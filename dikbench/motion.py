@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
+import pinocchio as pin
 
 from dikbench.array import Array
 from dikbench.kinematics import Kinematics
@@ -14,7 +15,7 @@ from dikbench.scenario import Scenario
 from dikbench.trace import Trace
 
 BLUR: Final = 1e-6
-"""How much squaring a Jacobian may change its smallest singular value (m, rad)."""
+"""How much rounding may change a small singular value (m, rad) when its matrix is squared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,32 +46,58 @@ class Motion:
     def sigma_min(self) -> float:
         """Smallest singular value of the task Jacobian (m, rad) on the way."""
         J = self.jacobians
-        # Squares are fast and blur small values: they only say where to look.
-        squares = np.linalg.eigvalsh(J @ J.transpose(0, 2, 1))[:, 0]
-        rough = np.sqrt(np.maximum(squares, 0.0))
-        candidates = J[rough <= rough.min() + BLUR]
-        return float(np.linalg.svd(candidates, compute_uv=False)[:, -1].min())
+        floor = _singular_value_floor(J)
+        worst = np.linalg.svd(J[floor.argmin()], compute_uv=False)[-1]
+        candidates = J[floor <= worst + BLUR]
+        return float(np.linalg.svd(candidates, compute_uv=False)[:, -1].min(initial=worst))
 
 
-def recompute(trace: Trace, scenario: Scenario) -> Motion:
-    """Compute the motion of the task frame from the recorded configurations and velocities."""
+def _singular_value_floor(J: Array) -> Array:
+    """A value that the smallest singular value of each J (k, m, n) is not below, but for rounding.
+
+    1/sigma_min^2 is the largest eigenvalue of (J J^T)^-1 and thus at most its Frobenius norm, which
+    costs a quarter of the singular values.
+    """
+    wide = J if J.shape[1] <= J.shape[2] else J.transpose(0, 2, 1)
+    try:
+        inverse = np.linalg.inv(wide @ wide.transpose(0, 2, 1))
+    except np.linalg.LinAlgError:  # one of them is singular to the last bit
+        return np.zeros(len(J))
+    floor: Array = 1 / np.sqrt(np.linalg.norm(inverse, axis=(1, 2)))
+    return floor
+
+
+def recompute(trace: Trace, scenario: Scenario, jacobians: Array | None = None) -> Motion:
+    """Compute the motion of the task frame from the recorded configurations and velocities.
+
+    Args:
+        trace: what was recorded.
+        scenario: the case that it is a trace of.
+        jacobians: the task Jacobians at its configurations but the last, (n, m, nv), where they are
+            at hand from the run; they would come out the same.
+    """
     robot, frame = scenario.robot, scenario.robot.frame_id
-    kinematics, n = Kinematics(robot), trace.steps
-    rotations, translations = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
-    jacobians = np.empty((n + 1, 6, robot.nv))
-    for k, q in enumerate(trace.q):
-        kinematics.update(q)
-        X = kinematics.placement(frame)
-        rotations[k], translations[k] = X.rotation, X.translation
-        jacobians[k] = kinematics.jacobian(frame)
-    wanted_rotations, wanted_translations = _wanted(trace, scenario)
+    model, data, n = robot.model, robot.model.createData(), trace.steps
     rows = np.array(robot.task_rows)
+    rotations, translations = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
+    for k, q in enumerate(trace.q):
+        pin.forwardKinematics(model, data, q)
+        X = pin.updateFramePlacement(model, data, frame)
+        rotations[k], translations[k] = X.rotation, X.translation
+    kinematics, J = Kinematics(robot), np.empty((n + 1, len(rows), robot.nv))
+    known = 0 if jacobians is None else n
+    if jacobians is not None:
+        J[:n] = jacobians
+    for k, q in enumerate(trace.q[known:], start=known):
+        kinematics.update(q)
+        J[k] = kinematics.jacobian(frame)[rows]
+    wanted_rotations, wanted_translations = _wanted(trace, scenario)
     return Motion(
         trace=trace,
         scenario=scenario,
         position_error=np.linalg.norm(translations - wanted_translations, axis=1),
         orientation_error=rotation_angles(rotations, wanted_rotations),
-        jacobians=jacobians if len(rows) == 6 else jacobians[:, rows],
+        jacobians=J,
     )
 
 

@@ -55,8 +55,10 @@ class Scenario:
 
     @cached_property
     def targets(self) -> list[tuple[Any, Any]]:
-        """Placement (`pinocchio.SE3`) and body twist (`pinocchio.Motion`) of the reference before
-        each step of a time-indexed run, and after the last; the same for every law."""
+        """Placement and body twist of the reference before each step and after the last.
+
+        Those of a time-indexed run, the same for every law: `pinocchio.SE3`, `pinocchio.Motion`.
+        """
         return [self.target(k * self.dt) for k in range(self.steps + 1)]
 
     def target(self, tau: float) -> tuple[Any, Any]:

@@ -33,6 +33,9 @@ FASTEST = 1e6
 FARTHEST = 100.0
 """A task error above this (m, rad) means that the run has diverged."""
 
+FAR_CHECK = 16
+"""The task error is looked at every so many steps."""
+
 ROUNDING = 1e-9
 """A path is at its end when this share of it is left."""
 
@@ -47,6 +50,7 @@ class Run:
         message: the reason, with the step at which it happened; empty for `ok`.
         kinematics_ns: time in kinematics and in setting up the problems, over all steps [ns].
         law_ns: time in the law, its solver included [ns].
+        jacobians: task Jacobians of the control steps, (n, m, nv).
     """
 
     trace: Trace
@@ -54,37 +58,44 @@ class Run:
     message: str
     kinematics_ns: int
     law_ns: int
+    jacobians: Array
 
 
 class _Recorder:
-    """Preallocated arrays that become a trace."""
+    """Lists that become the arrays of a trace; what is appended must not change any more."""
 
-    def __init__(self, scenario: Scenario, steps: int) -> None:
-        n, nv, m = steps, scenario.robot.nv, len(scenario.robot.task_rows)
-        self.q = np.empty((n + 1, scenario.robot.nq))
-        self.tau = np.arange(n + 1) * scenario.dt
-        self.wanted = np.empty((n, m))
-        self.task_jacobian = np.empty((n, m, nv))
-        self.commanded = np.empty((n, nv))
-        self.applied = np.empty((n, nv))
-        self.status = np.full(n, STEP_CODE[Status.OK])
-        self.relaxed = np.zeros(n, dtype=int)
+    def __init__(self, steps: int) -> None:
+        self.q: list[Array] = []
+        self.wanted: list[Array] = []
+        self.task_jacobian: list[Array] = []
+        self.commanded: list[Array] = []
+        self.applied: list[Array] = []
+        self.status = np.full(steps, STEP_CODE[Status.OK])
+        self.relaxed = np.zeros(steps, dtype=int)
 
-    def trace(self, scenario: Scenario, n: int, verdicts: Verdicts) -> Trace:
-        """The trace of the first n steps; steps that went nowhere become `stuck`."""
-        achieved = np.einsum("kij,kj->ki", self.task_jacobian[:n], self.commanded[:n])
-        alpha = progress(self.wanted[:n], achieved, row_weights(scenario.robot.task_rows))
+    def jacobians(self, scenario: Scenario) -> Array:
+        """The task Jacobians of the steps that were applied, (n, m, nv)."""
+        m, nv = len(scenario.robot.task_rows), scenario.robot.nv
+        return _joined(self.task_jacobian[: len(self.applied)], m, nv)
+
+    def trace(self, scenario: Scenario, tau: Array, verdicts: Verdicts, jacobians: Array) -> Trace:
+        """The trace of the steps that were applied; those that went nowhere become `stuck`."""
+        n, nv, m = len(self.applied), scenario.robot.nv, len(scenario.robot.task_rows)
+        wanted = _joined(self.wanted[:n], m)
+        commanded = _joined(self.commanded, nv)
+        achieved = np.einsum("kij,kj->ki", jacobians, commanded)
+        alpha = progress(wanted, achieved, row_weights(scenario.robot.task_rows))
         status, ok = self.status[:n].copy(), STEP_CODE[Status.OK]
         lied = (verdicts.claimed[:n] == 1) & (verdicts.verified[:n] == 0)
         status[(status == ok) & lied] = STEP_CODE[Status.NOT_VERIFIED]
         status[(status == ok) & (alpha < STUCK_PROGRESS)] = STEP_CODE[Status.STUCK]
         return Trace(
             scenario.dt,
-            self.q[: n + 1],
-            self.tau[: n + 1],
-            self.wanted[:n],
-            self.commanded[:n],
-            self.applied[:n],
+            _joined(self.q, scenario.robot.nq),
+            tau[: n + 1],
+            wanted,
+            commanded,
+            _joined(self.applied, nv),
             status,
             self.relaxed[:n],
             verdicts.claimed[:n],
@@ -94,6 +105,11 @@ class _Recorder:
             verdicts.gap[:n],
             verdicts.distance[:n],
         )
+
+
+def _joined(parts: list[Array], *shape: int) -> Array:
+    """Arrays of one shape as one array, (len(parts), *shape)."""
+    return np.concatenate(parts or [np.empty((0, *shape))]).reshape(len(parts), *shape)
 
 
 def simulate(
@@ -115,19 +131,18 @@ def simulate(
     Returns:
         The trace and how the run ended; failures of the law are statuses, never exceptions.
     """
-    robot, dt = scenario.robot, scenario.dt
-    model, limits_at = robot.model, robot.limits.at
+    robot, dt, secondaries = scenario.robot, scenario.dt, scenario.tasks
+    model, limits_at, integrate, ok = robot.model, robot.limits.at, pin.integrate, Status.OK
     steps = scenario.steps * (LONGEST if mode == "path" else 1)
     targets = scenario.targets if mode == "time" else None
     clock = _PathClock(scenario)
-    record = _Recorder(scenario, steps)
-    qs, wanted, jacobians = record.q, record.wanted, record.task_jacobian
-    commanded, applied_velocities = record.commanded, record.applied
+    record, tau = _Recorder(steps), dt * np.arange(steps + 1, dtype=float)
     kinematics, tracking = Kinematics(robot), PoseTask(gain=scenario.gain)
-    q, v_prev, k = scenario.q0, scenario.v0, 0
+    q, v_prev, k = _read_only(scenario.q0.copy()), _read_only(scenario.v0.copy()), 0
     kinematics_ns = law_ns = 0
-    status, message = Status.OK, ""
+    status, message = ok, ""
     solve.begin_run(steps)
+    record.q.append(q)
     try:
         for k in range(steps):
             if targets is not None:
@@ -136,16 +151,19 @@ def simulate(
                 break
             else:
                 target, twist = scenario.target(clock.tau)
-                record.tau[k] = clock.tau
+                tau[k] = clock.tau
             start = perf_counter_ns()
             kinematics.update(q)
             task = tracking.linearize(kinematics, target, twist)
-            tasks = [task, *[secondary.linearize(kinematics) for secondary in scenario.tasks]]
+            tasks = [task]
+            for secondary in secondaries:
+                tasks.append(secondary.linearize(kinematics))
             limits = limits_at(q)
             problem = DikProblem(robot, q, v_prev, dt, tasks, limits)
             kinematics_ns += perf_counter_ns() - start
-            qs[k], wanted[k], jacobians[k] = q, task.V, task.J
-            if task.error.dot(task.error) > FARTHEST**2:
+            record.wanted.append(task.V)
+            record.task_jacobian.append(task.J)
+            if k % FAR_CHECK == 0 and task.error.dot(task.error) > FARTHEST**2:
                 raise TrialEnded(Status.DIVERGED, f"task error above {FARTHEST:g} m, rad")
             outcome = control_step(formulation, problem, solve, k)
             law_ns += outcome.law_ns
@@ -153,25 +171,29 @@ def simulate(
             if outcome.square > FASTEST**2:
                 raise TrialEnded(Status.DIVERGED, f"commanded speed above {FASTEST:g} rad/s")
             applied = plant(v, limits, dt)
-            commanded[k], applied_velocities[k] = v, applied
-            if outcome.status is not Status.OK:
+            if outcome.status is not ok:
                 record.status[k] = STEP_CODE[outcome.status]
             if problem.relaxed:
                 record.relaxed[k] = problem.relaxed
             if targets is None:
                 clock.advance(task.V, task.J @ applied)
-            q = pin.integrate(model, q, applied * dt)
+            q = integrate(model, q, applied * dt)
+            record.commanded.append(v)
+            record.applied.append(applied)
+            record.q.append(q)
             v_prev = applied
-        else:
-            k = steps
     except TrialEnded as ended:
         status, message = ended.status, f"step {k}: {ended}"
-    qs[k] = q
     if targets is None:
-        record.tau[k] = clock.tau
-    return Run(
-        record.trace(scenario, k, solve.verdicts()), status, message, kinematics_ns, law_ns
-    )
+        tau[len(record.applied)] = clock.tau
+    jacobians = record.jacobians(scenario)
+    trace = record.trace(scenario, tau, solve.verdicts(), jacobians)
+    return Run(trace, status, message, kinematics_ns, law_ns, jacobians)
+
+
+def _read_only(array: Array) -> Array:
+    array.flags.writeable = False
+    return array
 
 
 class _PathClock:

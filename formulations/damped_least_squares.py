@@ -46,4 +46,5 @@ class DampedLeastSquares:
         if y is None:  # (almost) no damping, at a singularity
             v: Array = pseudo_inverse(J, np.finfo(float).eps) @ task.V
             return v
-        return y.dot(J)
+        v = y.dot(J)
+        return v

@@ -10,6 +10,7 @@ import numpy as np
 from dikbench.array import Array
 from dikbench.box import Braking
 from dikbench.errors import DikbenchError
+from dikbench.linear_algebra import scaled_identity
 from dikbench.problem import DikProblem, LimitKind, Solve
 from dikbench.quadratic_program import Program, QuadraticProgram
 
@@ -54,11 +55,12 @@ class WeightedQp:
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
-        P, wanted = problem.tasks[0].normal_equations(log_derivative=self.log_derivative)
-        for task in problem.tasks[1:]:
-            more_P, more_wanted = task.normal_equations(log_derivative=self.log_derivative)
-            P += more_P
-            wanted += more_wanted
-        P.flat[:: len(P) + 1] += self.damping**2
+        first, *others = problem.tasks
+        P, wanted = first.normal_equations(log_derivative=self.log_derivative)
+        P = P + scaled_identity(problem.robot.nv, self.damping**2)
+        for task in others:
+            square, pull = task.normal_equations(log_derivative=self.log_derivative)
+            P = P + square
+            wanted = wanted + pull
         box = problem.box(self.braking, self.position_gain)
         return solve(QuadraticProgram(P, -wanted, lb=box.lower, ub=box.upper))

@@ -37,7 +37,7 @@ def draw_time_series(
     traces = {
         row.formulation: Trace.load(path)
         for row in chosen.itertuples()
-        if (path := folder.traces / f"{_trial(row).id}.npz").is_file()
+        if (path := folder.traces / f"{_trial(row).id}.arrow").is_file()
     }
     if not traces:
         return None

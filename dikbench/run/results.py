@@ -57,7 +57,7 @@ class ResultsFolder:
 
     def forget_traces_but(self, names: Collection[str]) -> None:
         """Remove the traces of an earlier run into this folder: they belong to no row any more."""
-        for path in self.traces.glob("*.npz"):
+        for path in self.traces.glob("*.arrow"):
             if path.stem not in names:
                 path.unlink()
 

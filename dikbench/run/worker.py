@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 from dikbench.errors import DikbenchError
@@ -61,7 +62,8 @@ def run_trial(trial: Trial, traces: Path | None) -> Row:
         traces: folder for its trace, or None.
 
     Returns:
-        Its row: keys, status, message, number of steps, every metric.
+        Its row: keys, status, message, number of steps, every metric; `wall_time_s` of the run and
+        of it `control_time_s`, in kinematics, law and solver (the rest is the harness's).
     """
     try:
         scenario = scenario_of(trial.scenario, trial.seed)
@@ -71,6 +73,7 @@ def run_trial(trial: Trial, traces: Path | None) -> Row:
         reason = "the scenario has no path that could wait for the robot"
         return row_without_run(trial, Status.SKIPPED, reason)
     mode: ReferenceMode = "path" if trial.reference == "path" else "time"
+    start = perf_counter()
     run = simulate(
         scenario,
         make_formulation(trial.formulation),
@@ -79,11 +82,16 @@ def run_trial(trial: Trial, traces: Path | None) -> Row:
         mode,
     )
     if traces is not None:
-        run.trace.save(traces / f"{trial.id}.npz")
+        run.trace.save(traces / f"{trial.id}.arrow")
+    metrics = {}
+    if run.trace.steps:
+        metrics = evaluate(recompute(run.trace, scenario, run.jacobians))
     return {
         **header(trial),
         "status": run.status.value,
         "message": run.message,
         "steps": run.trace.steps,
-        **(evaluate(recompute(run.trace, scenario)) if run.trace.steps else {}),
+        **metrics,
+        "wall_time_s": perf_counter() - start,
+        "control_time_s": (run.kinematics_ns + run.law_ns) / 1e9,
     }

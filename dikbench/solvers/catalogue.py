@@ -155,8 +155,8 @@ def parse_solver(text: str) -> Solver:
     A setting that is named beside a preset goes before the preset's.
 
     Raises:
-        DikbenchError: on an unknown solver, interface, preset or setting, a value of the wrong type, or
-            a solver that is not installed.
+        DikbenchError: on an unknown solver, interface, preset or setting, a value of the wrong
+            type, or a solver that is not installed.
     """
     selector = parse_selector(text)
     if selector.name not in BACK_ENDS:

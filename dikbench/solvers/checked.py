@@ -15,8 +15,8 @@ from dikbench.quadratic_program import Program, QuadraticProgram
 from dikbench.solvers.answer import Answer
 from dikbench.solvers.catalogue import Solver
 from dikbench.solvers.feasibility import is_feasible
-from dikbench.solvers.recheck import Solved, Verdicts
 from dikbench.solvers.presets import TOLERANCES
+from dikbench.solvers.recheck import Solved, Verdicts
 
 BATCH: Final = 512
 """Answers that wait for their recheck: many, since they are rechecked at once; not the whole run,
@@ -98,16 +98,16 @@ class CheckedSolve:
         # One product says whether there is an x and whether it is finite.
         if answer.claimed and x is not None and x.dot(x) < np.inf:
             return x
-        try:
-            self._refuse(program)
-        finally:
-            self.checking_ns += perf_counter_ns() - solved
+        error = self._reason(program)
+        self.checking_ns += perf_counter_ns() - solved
+        raise error
 
-    def _refuse(self, program: QuadraticProgram | ModelledProgram) -> None:
+    def _reason(self, program: QuadraticProgram | ModelledProgram) -> Infeasible | SolverFailed:
+        """Why there is no answer; the timing pass does not ask."""
         matrices = program.matrices() if isinstance(program, ModelledProgram) else program
         if not self._checks or is_feasible(matrices):
-            raise SolverFailed("the solver gave no answer to a feasible program")
-        raise Infeasible("the program has no feasible point")
+            return SolverFailed("the solver gave no answer to a feasible program")
+        return Infeasible("the program has no feasible point")
 
 
 class NoSolve(CheckedSolve):

@@ -49,7 +49,7 @@ def distance_to_optimum(
     """
     distance = np.where(nearness <= PROVEN, nearness, np.nan)
     judge = ColdSolver(JUDGE)
-    for k in np.flatnonzero(np.isnan(distance)):
+    for k in np.flatnonzero(np.isnan(distance)).tolist():
         program, x = programs[k], answers[k].x
         assert x is not None
         judged = judge(program)

@@ -90,7 +90,11 @@ class LinearizedPose(LinearizedTask):
         relative: Any,
         rows: Any,
     ) -> None:
-        super().__init__(J, V, error, weight, priority)
+        self.J = J  # all here, without a call of super: this is made in every control step
+        self.V = V
+        self.error = error
+        self.weight = weight
+        self.priority = priority
         self.relative = relative
         self.rows = rows
 

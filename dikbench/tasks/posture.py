@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 import pinocchio as pin
@@ -11,6 +10,7 @@ import pinocchio as pin
 from dikbench.array import Array
 from dikbench.errors import DikbenchError
 from dikbench.kinematics import Kinematics
+from dikbench.linear_algebra import scaled_identity
 from dikbench.robot import Robot
 from dikbench.tasks.task import LinearizedTask
 
@@ -44,12 +44,12 @@ class PostureTask:
             DikbenchError: if the target is not an array of the robot's shape (nq,).
         """
         robot = kinematics.robot
-        shape = getattr(self.target, "shape", type(self.target).__name__)
-        if shape != (robot.nq,):
+        if not isinstance(self.target, np.ndarray) or self.target.shape != robot.q0.shape:
+            shape = getattr(self.target, "shape", type(self.target).__name__)
             raise DikbenchError(f"posture task: expected shape ({robot.nq},), got {shape}")
         error: Array = pin.difference(robot.model, kinematics.q, self.target)
         return LinearizedPosture(
-            _identity(robot.nv), self.gain * error, error, self.weight, self.priority
+            scaled_identity(robot.nv, 1.0), self.gain * error, error, self.weight, self.priority
         )
 
 
@@ -60,14 +60,9 @@ class LinearizedPosture(LinearizedTask):
 
     def normal_equations(self, *, log_derivative: bool = False) -> tuple[Array, Array]:
         """W and W V (see `LinearizedTask`): nothing to multiply."""
+        if type(self.weight) is float:
+            return scaled_identity(len(self.V), self.weight), self.V * self.weight
         return self.J * self.weight, self.V * self.weight
-
-
-@lru_cache(maxsize=16)
-def _identity(nv: int) -> Array:
-    identity = np.eye(nv)
-    identity.flags.writeable = False
-    return identity
 
 
 def middle_posture(robot: Robot) -> Array:

@@ -46,6 +46,8 @@ class LinearizedTask:
     def normal_equations(self, *, log_derivative: bool = False) -> tuple[Array, Array]:
         """J^T W J, (nv, nv), and J^T W V, (nv,): the task's share of a least-squares cost.
 
+        To be read, not written to: some tasks have the same matrix in every step.
+
         Args:
             log_derivative: whether to multiply J and V by the matrix of that name first.
         """

@@ -43,9 +43,7 @@ class ClarabelWorkspace:
         claimed = result.status == clarabel.SolverStatus.Solved
         return self._answer(program, np.array(result.x), np.array(result.z), claimed, core_ns)
 
-    def _set_up(
-        self, program: QuadraticProgram, finite: tuple[Indices, Indices, Indices]
-    ) -> None:
+    def _set_up(self, program: QuadraticProgram, finite: tuple[Indices, Indices, Indices]) -> None:
         """Lay the rows out: one for each finite right-hand side."""
         n = len(program.q)
         self._finite = finite

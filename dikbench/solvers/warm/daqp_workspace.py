@@ -9,6 +9,7 @@ from typing import Any, Final
 import daqp
 import numpy as np
 
+from dikbench.array import Array
 from dikbench.quadratic_program import QuadraticProgram
 from dikbench.solvers.answer import Answer
 
@@ -29,38 +30,41 @@ class DaqpWorkspace:
         m = self._first_equality + (0 if program.b is None else len(program.b))
         self._rows = np.zeros((m - self._bounds, n))
         self._upper, self._lower = np.full(m, INFINITE), np.full(m, -INFINITE)
-        self._sense = np.zeros(m, dtype=np.int32)
-        self._sense[self._first_equality :] = EQUALITY
+        sense = np.zeros(m, dtype=np.int32)
+        sense[self._first_equality :] = EQUALITY
+        self._has_rows = len(self._rows) > 0
         self._model = daqp.Model()
-        self._settings = dict(settings)
-        self._is_set_up = False
+        self._fill(program)
+        P, q = _writable(program.P), _writable(program.q)
+        self._model.setup(P, q, self._rows, self._upper, self._lower, sense)
+        self._model.settings = dict(settings)
 
     def solve(self, program: QuadraticProgram) -> Answer:
         """See `Workspace`."""
-        self._fill(program)
-        # daqp takes no read-only arrays; its own are these.
-        P = program.P if program.P.flags.writeable else program.P.copy()
-        q = program.q if program.q.flags.writeable else program.q.copy()
-        model, rows, upper, lower = self._model, self._rows, self._upper, self._lower
-        if self._is_set_up:
-            A = rows if len(rows) else None
-            flag = model.update(H=P, f=q, A=A, bupper=upper, blower=lower)
+        model, P, q, upper, lower = self._model, program.P, program.q, program.ub, program.lb
+        if not (P.flags.writeable and q.flags.writeable):
+            P, q = _writable(P), _writable(q)
+        if self._has_rows:
+            self._fill(program)
+            flag = model.update(H=P, f=q, A=self._rows, bupper=self._upper, blower=self._lower)
+        elif upper is self._last_upper and lower is self._last_lower and _is_fixed(upper, lower):
+            flag = model.update(H=P, f=q)
         else:
-            flag, _ = model.setup(P, q, rows, upper, lower, self._sense)
-            model.settings = self._settings
-            self._is_set_up = True
+            self._fill(program)
+            flag = model.update(H=P, f=q, bupper=self._upper, blower=self._lower)
         if flag < 0:
             return Answer(None, claimed=False)
         start = perf_counter_ns()
         x, _, flag, info = model.solve()
         core_ns = perf_counter_ns() - start
         pushes = info["lam"]
-        if len(rows):
+        if self._has_rows:
             i, j = self._bounds, self._first_equality
             return Answer(x, flag > 0, pushes[j:], pushes[i:j], pushes[:i], core_ns)
-        return Answer(x, flag > 0, z_box=pushes, core_ns=core_ns)
+        return Answer(x, flag > 0, None, None, pushes, core_ns)
 
     def _fill(self, program: QuadraticProgram) -> None:
+        self._last_upper, self._last_lower = program.ub, program.lb
         i, j = self._bounds, self._first_equality
         if program.ub is not None:
             self._upper[:i] = program.ub
@@ -73,3 +77,15 @@ class DaqpWorkspace:
             self._upper[j:] = program.b
             self._lower[j:] = program.b
             self._rows[j - i :] = program.A
+
+
+def _writable(array: Array) -> Array:
+    """The array, or a copy of one that is read-only, which daqp does not take."""
+    return array if array.flags.writeable else array.copy()
+
+
+def _is_fixed(upper: Array | None, lower: Array | None) -> bool:
+    """Whether bounds cannot have changed: away from limits each step has the same, read-only."""
+    return (upper is None or not upper.flags.writeable) and (
+        lower is None or not lower.flags.writeable
+    )

@@ -24,9 +24,7 @@ class ProxqpWorkspace:
         self._none = np.full(n, np.inf)
         self._below = np.full(self._inequalities, -np.inf)
         self._solver = proxqp.dense.QP(n, m, self._inequalities, self._bounded)
-        self._solver.settings.initial_guess = (
-            proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
-        )
+        self._solver.settings.initial_guess = proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
         for key, value in settings.items():
             setattr(self._solver.settings, key, value)
         self._is_set_up = False

@@ -21,16 +21,22 @@ WORKSPACES: Final = {
 """The class of each back end, in the file of the back end's name."""
 
 
-class WarmSolver:
-    """A back end with a workspace per call site of a control step and structure of the program."""
+Structure = tuple[int, int | None, int | None, bool, bool]
+"""Number of unknowns, of equalities and inequalities, and which bounds there are not."""
 
-    __slots__ = ("_make", "_settings", "_workspaces")
+NOTHING: Final = None, None
+
+
+class WarmSolver:
+    """A back end with a workspace per call site, made anew where the structure changes."""
+
+    __slots__ = ("_make", "_settings", "_sites")
 
     def __init__(self, solver: Solver) -> None:
         module = import_module(f"dikbench.solvers.warm.{solver.name}_workspace")
         self._make: type[Workspace] = getattr(module, WORKSPACES[solver.name])
         self._settings = solver.settings
-        self._workspaces: dict[tuple[object, ...], Workspace] = {}
+        self._sites: dict[int, tuple[Structure, Workspace]] = {}
 
     def __call__(self, program: QuadraticProgram, site: int) -> Answer:
         """Solve a program; a failure of any kind is an answer that claims nothing.
@@ -39,21 +45,22 @@ class WarmSolver:
             program: what to solve.
             site: number of the call within its control step: the same site meets similar programs.
         """
-        key = (
-            site,
+        b, h = program.b, program.h
+        structure = (
             len(program.q),
-            -1 if program.b is None else len(program.b),
-            -1 if program.h is None else len(program.h),
+            None if b is None else len(b),
+            None if h is None else len(h),
             program.lb is None,
             program.ub is None,
         )
         try:
-            workspace = self._workspaces.get(key)
-            if workspace is None:
-                workspace = self._workspaces[key] = self._make(program, self._settings)
+            known, workspace = self._sites.get(site, NOTHING)
+            if workspace is None or known != structure:
+                workspace = self._make(program, self._settings)
+                self._sites[site] = structure, workspace
             answer = workspace.solve(program)
         except Exception:  # each library has its own
             answer = Answer(None, claimed=False)
         if not answer.claimed:  # what failed is no place to start from
-            self._workspaces.pop(key, None)
+            self._sites.pop(site, None)
         return answer
