@@ -22,7 +22,10 @@ contract:        ## the contract suite against the built wheel, outside the chec
 quick:           ## the default study
 	.venv/bin/dikbench run
 
+benchmark:       ## how fast the harness is, against its peers (let nothing else run)
+	$(PYTHON) -m pip install --quiet -e ".[peers,drake]" && $(PYTHON) tests/benchmarks/ratios.py
+
 constraints:     ## the installed versions become the tested ones
 	.venv/bin/pip freeze --exclude-editable --exclude pip --exclude setuptools > constraints.txt
 
-.PHONY: help setup test lint format contract quick constraints
+.PHONY: help setup test lint format contract quick benchmark constraints

@@ -1,4 +1,4 @@
-"""The command line: `dikbench run`, `list`, `show`. Heavy imports stand inside the commands."""
+"""The command line. Heavy imports stand inside the commands."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def main() -> None:
         click.echo("error: " + " ".join(error.format_message().split()), err=True)
         sys.exit(2)
     except click.Abort:
-        click.echo("interrupted: nothing was written", err=True)
+        click.echo("interrupted", err=True)
         sys.exit(130)
 
 
@@ -55,51 +55,76 @@ def commands() -> None:
     """
 
 
+STUDY_OPTIONS = (
+    click.argument("study", required=False),
+    click.option(
+        "--formulation",
+        "formulations",
+        multiple=True,
+        metavar="SELECTOR",
+        help="A law, or path/to/file.py:Class; repeat for more.",
+    ),
+    click.option(
+        "--scenario",
+        "scenarios",
+        multiple=True,
+        metavar="SELECTOR",
+        help="A scenario; repeat for more.",
+    ),
+    click.option(
+        "--solver",
+        "solvers",
+        multiple=True,
+        metavar="SELECTOR",
+        help="A solver, for laws that need one; repeat for more.",
+    ),
+    click.option(
+        "--seed",
+        "seeds",
+        multiple=True,
+        type=click.IntRange(min=0),
+        metavar="N",
+        help="A seed of the scenarios; 0 perturbs nothing; repeat for more.",
+    ),
+    click.option(
+        "--plant",
+        "plants",
+        multiple=True,
+        type=click.Choice(["ideal", "saturating"]),
+        help="What becomes of a command; repeat for both.",
+    ),
+    click.option(
+        "--reference",
+        "references",
+        multiple=True,
+        type=click.Choice(["time", "path"]),
+        help="What moves the reference on: the clock, or the progress achieved.",
+    ),
+    click.option(
+        "--out",
+        type=click.Path(path_type=Path, file_okay=False),
+        metavar="DIR",
+        help="Results folder; default: runs/STUDY.",
+    ),
+)
+
+
+def study_options(command: Callable[..., None]) -> Callable[..., None]:
+    """The options that select a study, its axes and its results folder."""
+    for option in reversed(STUDY_OPTIONS):
+        command = option(command)
+    return command
+
+
+def _selected(study: str | None, axes: dict[str, Any]) -> Any:
+    """The study that the options select."""
+    from dikbench.study import DEFAULT_STUDY, Selection, load_study, select
+
+    return select(load_study(study or DEFAULT_STUDY), Selection(**axes), named=study is not None)
+
+
 @commands.command()
-@click.argument("study", required=False)
-@click.option(
-    "--formulation",
-    "formulations",
-    multiple=True,
-    metavar="SELECTOR",
-    help="A law, or path/to/file.py:Class; repeat for more.",
-)
-@click.option(
-    "--scenario",
-    "scenarios",
-    multiple=True,
-    metavar="SELECTOR",
-    help="A scenario; repeat for more.",
-)
-@click.option(
-    "--solver",
-    "solvers",
-    multiple=True,
-    metavar="SELECTOR",
-    help="A solver, for laws that need one; repeat for more.",
-)
-@click.option(
-    "--seed",
-    "seeds",
-    multiple=True,
-    type=click.IntRange(min=0),
-    metavar="N",
-    help="A seed of the scenarios; 0 perturbs nothing; repeat for more.",
-)
-@click.option(
-    "--plant",
-    "plants",
-    multiple=True,
-    type=click.Choice(["ideal", "saturating"]),
-    help="What becomes of a command; repeat for both.",
-)
-@click.option(
-    "--reference",
-    "references",
-    multiple=True,
-    type=click.Choice(["time", "path"]),
-    help="What moves the reference on: the clock, or the progress achieved.",
-)
+@study_options
 @click.option(
     "--jobs",
     type=click.IntRange(min=1),
@@ -107,39 +132,99 @@ def commands() -> None:
     help="Worker processes; default: one per core.",
 )
 @click.option(
-    "--out",
-    type=click.Path(path_type=Path, file_okay=False),
-    metavar="DIR",
-    help="Results folder; default: runs/STUDY.",
+    "--rerun",
+    default="",
+    metavar="WHICH",
+    help="Run finished trials again: failed, all, or a law, scenario or solver.",
+)
+@click.option(
+    "--trial-timeout",
+    type=click.FloatRange(min=0, min_open=True),
+    default=120.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="Wall-clock limit of a trial.",
+)
+@click.option(
+    "--trial-memory",
+    type=click.IntRange(min=1),
+    default=4096,
+    show_default=True,
+    metavar="MB",
+    help="Memory of a trial.",
+)
+@click.option(
+    "--traces",
+    type=click.Choice(["all", "failures", "none"]),
+    default="all",
+    show_default=True,
+    help="Which trials keep their control steps.",
 )
 @one_line_errors
 def run(
     study: str | None,
-    formulations: tuple[str, ...],
-    scenarios: tuple[str, ...],
-    solvers: tuple[str, ...],
-    seeds: tuple[int, ...],
-    plants: tuple[str, ...],
-    references: tuple[str, ...],
-    jobs: int | None,
     out: Path | None,
-) -> None:  # fmt: skip
-    """Run a study: the matrix of laws x scenarios x solvers.
+    jobs: int | None,
+    rerun: str,
+    trial_timeout: float,
+    trial_memory: int,
+    traces: Any,
+    **axes: Any,
+) -> None:
+    """Run what is missing of a study: the matrix of laws x scenarios x solvers.
 
     STUDY is a shipped study (see `dikbench list studies`) or a TOML file; default: quick. Each
-    option replaces an axis of the study.
+    option replaces an axis of the study. The same command continues a run that was stopped.
     """
     from dikbench.report.page import write_report
-    from dikbench.run.runner import run_study
+    from dikbench.run.runner import Interrupted, RunSettings, run_study
     from dikbench.run.workers import available_cores
-    from dikbench.study import DEFAULT_STUDY, Selection, load_study, select
 
-    selection = Selection(formulations, scenarios, solvers, seeds, plants, references)
-    selected = select(load_study(study or DEFAULT_STUDY), selection, named=study is not None)
+    selected = _selected(study, axes)
     folder = out or Path("runs") / selected.name
     command = shlex.join(["dikbench", *sys.argv[1:]])
-    run_study(selected, folder, jobs or available_cores(), command)
+    settings = RunSettings(jobs or available_cores(), trial_timeout, trial_memory, traces, rerun)
+    try:
+        run_study(selected, folder, settings, command)
+    except Interrupted as stopped:
+        click.echo(f"\nstopped: {stopped}; to continue: {command}", err=True)
+        sys.exit(130)
     click.echo(f"\n{write_report(folder)}\n\n{folder / 'report.md'}")
+
+
+@commands.command()
+@study_options
+@one_line_errors
+def time(study: str | None, out: Path | None, **axes: Any) -> None:
+    """Take the times of a study's cells anew, without its trials; let nothing else run.
+
+    STUDY and the options are those of `dikbench run`.
+    """
+    from dikbench.report.page import write_times
+    from dikbench.run.runner import Interrupted, time_study
+
+    selected = _selected(study, axes)
+    folder = out or Path("runs") / selected.name
+    command = shlex.join(["dikbench", *sys.argv[1:]])
+    try:
+        time_study(selected, folder, command)
+    except Interrupted as stopped:
+        click.echo(f"\nstopped: {stopped}", err=True)
+        sys.exit(130)
+    click.echo(f"\n{write_times(folder)}\n\n{folder / 'timing.csv'}")
+
+
+@commands.command()
+@click.argument("folder", type=click.Path(path_type=Path, file_okay=False))
+@one_line_errors
+def status(folder: Path) -> None:
+    """Count the trials of a results folder: done, failed by status, missing."""
+    from dikbench.run.runner import status_of
+
+    counts = status_of(folder)
+    for name, number in counts.items():
+        click.echo(f"{number:7} {name}")
+    click.echo(f"{sum(counts.values()):7} planned")
 
 
 @commands.command("list")

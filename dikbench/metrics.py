@@ -9,7 +9,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from dikbench.array import Array
+from dikbench.array import Array, Mask
 from dikbench.limits import Interval
 from dikbench.motion import Motion
 from dikbench.progress import STUCK_PROGRESS, off_course, progress, row_weights
@@ -128,6 +128,12 @@ def _share(status: Status) -> Callable[[Motion], float]:
     return lambda motion: motion.trace.share(status)
 
 
+def _share_of(steps: Mask, motion: Motion) -> float:
+    """The share of the steps at which something was solved; NaN where nothing ever was."""
+    asked = motion.trace.claimed >= 0
+    return float(np.mean(steps[asked])) if asked.any() else float("nan")
+
+
 def _last(values: Array) -> float:
     return float(values[-1])
 
@@ -222,6 +228,21 @@ METRICS: Mapping[str, Metric] = MappingProxyType(
                 "not_verified_share", "", "low", 1.0, "limit violation",
                 "share of the steps whose answer, claimed solved, failed the recheck",
                 _share(Status.NOT_VERIFIED),
+            ),
+            Metric(
+                "claimed_share", "", "high", 0.0, "limit violation",
+                "share of the steps with programs of which the solver said that it solved them all",
+                lambda m: _share_of(m.trace.claimed == 1, m),
+            ),
+            Metric(
+                "verified_share", "", "high", 0.0, "limit violation",
+                "share of the steps with programs whose answers are all right by our own residuals",
+                lambda m: _share_of(m.trace.verified == 1, m),
+            ),
+            Metric(
+                "disagreed_share", "", "low", 1.0, "limit violation",
+                "share of the steps with programs at which claim and recheck disagree",
+                lambda m: _share_of(m.trace.claimed != m.trace.verified, m),
             ),
             Metric(
                 "optimum_distance_max_rad_s",

@@ -175,6 +175,21 @@ def make_scenario(text: str, seed: int = 0) -> Scenario:
     return scenario
 
 
+def scenario_parameters(text: str) -> Mapping[str, Any]:
+    """The parameters of a scenario's selector with their values, defaults among them, but the seed.
+
+    Raises:
+        DikbenchError: on an unknown family or parameter, or a value of the wrong type.
+    """
+    selector = parse_selector(text)
+    plugin = scenario_plugin(selector.name)
+    if "seed" in selector.parameters:
+        raise DikbenchError(f"scenario {text!r}: the seed is not a parameter; use --seed")
+    defaults = {name: parameter.default for name, parameter in plugin.parameters.items()}
+    given = _values("scenario", plugin, selector)
+    return {name: value for name, value in {**defaults, **given}.items() if name != "seed"}
+
+
 def scenario_plugin(name: str) -> Plugin:
     """The plug-in behind a scenario family's name."""
     known = plugins("scenario")
@@ -203,22 +218,11 @@ def _target(build: Any) -> Any:
 
 
 def _build(kind: Kind, plugin: Plugin, selector: Selector, extra: Mapping[str, Any]) -> Any:
-    """Call a plug-in with the selector's parameters, converted to the types it declares."""
-    parameters = plugin.parameters
-    values = dict(extra)
-    for name, text in selector.parameters.items():
-        if name not in parameters:
-            raise unknown(f"parameter of {kind} {plugin.name}", name, set(parameters) - {"seed"})
-        wanted = _type_of(plugin.documented, parameters[name])
-        try:
-            values[name] = msgspec.convert(text, wanted, strict=False)
-        except (msgspec.ValidationError, TypeError) as error:  # a TypeError: no text can give it
-            raise DikbenchError(
-                f"{kind} {plugin.name}: {name}={text!r} is not valid: {_reason(error, wanted)}"
-            ) from None
+    """Call a plug-in with the selector's parameters."""
+    values = {**extra, **_values(kind, plugin, selector)}
     missing = [
         name
-        for name, parameter in parameters.items()
+        for name, parameter in plugin.parameters.items()
         if parameter.default is parameter.empty and name not in values
     ]
     if missing:
@@ -230,6 +234,23 @@ def _build(kind: Kind, plugin: Plugin, selector: Selector, extra: Mapping[str, A
     except Exception as error:
         reason = f"{type(error).__name__}: {error}".partition("\n")[0]
         raise DikbenchError(f"{kind} {plugin.name} of {plugin.file}: {reason}") from error
+
+
+def _values(kind: Kind, plugin: Plugin, selector: Selector) -> dict[str, Any]:
+    """The selector's parameters, converted to the types that the plug-in declares."""
+    parameters = plugin.parameters
+    values: dict[str, Any] = {}
+    for name, text in selector.parameters.items():
+        if name not in parameters:
+            raise unknown(f"parameter of {kind} {plugin.name}", name, set(parameters) - {"seed"})
+        wanted = _type_of(plugin.documented, parameters[name])
+        try:
+            values[name] = msgspec.convert(text, wanted, strict=False)
+        except (msgspec.ValidationError, TypeError) as error:  # a TypeError: no text can give it
+            raise DikbenchError(
+                f"{kind} {plugin.name}: {name}={text!r} is not valid: {_reason(error, wanted)}"
+            ) from None
+    return values
 
 
 def _type_of(target: Any, parameter: inspect.Parameter) -> Any:

@@ -11,14 +11,19 @@ from typing import Annotated, Any, Literal
 import msgspec
 
 from dikbench.errors import DikbenchError, unknown
+from dikbench.identity import trial_id
 from dikbench.plants import PLANTS, REFERENCE_MODES
 from dikbench.problem import program_of
-from dikbench.registry import make_formulation, make_scenario
+from dikbench.registry import make_formulation, make_scenario, scenario_parameters
 from dikbench.selector import parse_selector
 from dikbench.solvers.catalogue import DEFAULT_SOLVER, parse_solver, why_not
 from dikbench.trial import NO_SOLVER, Trial
 
 DEFAULT_STUDY = "quick"
+
+BUILT_AHEAD = 40
+"""So many scenarios of a study are built before anything runs; of the others, in studies with
+hundreds, the parameters are checked and a certificate that fails is a skipped row."""
 
 NOT_EMPTY = msgspec.Meta(min_length=1)
 Names = Annotated[tuple[str, ...], NOT_EMPTY]
@@ -75,8 +80,9 @@ class Study(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class PlannedTrial(msgspec.Struct, frozen=True):
-    """A trial, and why it cannot run, if it cannot."""
+    """A trial, its id, and why it cannot run, if it cannot."""
 
+    id: str
     trial: Trial
     skip: str = ""
 
@@ -181,21 +187,24 @@ def _cells_for(base: Study, text: str, named: bool) -> Cells:
 def expand(study: Study) -> list[PlannedTrial]:
     """Every trial of a study, in a fixed order, each once.
 
-    Names, parameters and solvers are checked, and each scenario is built once with the first seed,
-    so that a mistake shows before anything runs. A pair of law and solver that cannot work is kept,
+    Names, parameters and solvers are checked, and the first scenarios are built, so that a mistake
+    shows before anything runs. A pair of law and solver that cannot work is kept,
     with the reason.
 
     Raises:
         DikbenchError: on the first selector that does not name anything valid.
     """
-    for scenario in study.scenarios:
-        make_scenario(scenario, study.seeds[0])
+    for number, scenario in enumerate(study.scenarios):
+        if number < BUILT_AHEAD:
+            make_scenario(scenario, study.seeds[0])
+        else:
+            scenario_parameters(scenario)
     if study.timing is not None and program_of(make_formulation(study.timing.reference)):
         raise DikbenchError(
             f"study {study.name}: timing.reference {study.timing.reference!r} needs a solver; "
             "name a law that needs none"
         )
-    planned: dict[Trial, PlannedTrial] = {}
+    planned: dict[str, PlannedTrial] = {}
     for cells in study.cells:
         for formulation in cells.formulations:
             for solver, skip in _solvers_for(study, formulation, cells.solvers):
@@ -203,7 +212,8 @@ def expand(study: Study) -> list[PlannedTrial]:
                     study.scenarios, study.plants, study.references, study.seeds
                 ):
                     trial = Trial(formulation, scenario, solver, plant, reference, seed)
-                    planned.setdefault(trial, PlannedTrial(trial, skip))
+                    name = trial_id(trial)
+                    planned.setdefault(name, PlannedTrial(name, trial, skip))
     return list(planned.values())
 
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 NO_SOLVER = "none"
 """What stands in the place of the solver of a law that needs none."""
@@ -28,9 +26,3 @@ class Trial:
     plant: str
     reference: str
     seed: int
-
-    @property
-    def id(self) -> str:
-        """A name made of what the trial is made of."""
-        text = json.dumps(asdict(self), sort_keys=True)
-        return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()

@@ -9,8 +9,11 @@ import jinja2
 import pandas as pd
 
 from dikbench.report.figures import draw_figures
+from dikbench.report.return_codes import TITLE as RETURN_CODES
+from dikbench.report.return_codes import return_codes
 from dikbench.report.tables import ALL, LAW, TABLES, make_table, markdown_rows, to_markdown
 from dikbench.run.results import ResultsFolder
+from dikbench.run.stability import STABLE
 
 WORTH_SAYING = 0.01
 """A share of steps above this is remarked upon."""
@@ -27,15 +30,12 @@ def write_report(path: Path) -> str:
     """
     folder = ResultsFolder(path)
     trials, manifest = folder.read()
-    shown = []
-    (path / "tables").mkdir(exist_ok=True)
-    for name, kind in TABLES.items():
-        table = make_table(kind, trials)
-        table.to_csv(path / "tables" / f"{name}.csv", index=False)
-        (path / "tables" / f"{name}.md").write_text(to_markdown(kind, table))
-        rows = table[table["family"] == ALL].drop(columns="family")
-        text = markdown_rows(rows) if len(rows) else "Nothing was measured."
-        shown.append({"name": name, "title": kind.title, "rows": text})
+    shown = [_written(path, name, trials) for name in TABLES]
+    codes = return_codes(trials)
+    codes.to_csv(path / "tables" / "return_codes.csv", index=False)
+    text = markdown_rows(codes) if len(codes) else "Nothing was solved."
+    (path / "tables" / "return_codes.md").write_text(f"# {RETURN_CODES}\n\n{text}\n")
+    shown.append({"name": "return_codes", "title": RETURN_CODES, "rows": text})
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("dikbench.report", ""),
         autoescape=False,  # Markdown, not HTML
@@ -61,11 +61,59 @@ def write_report(path: Path) -> str:
     return "\n".join([*printed, counts, *(f"- {remark}" for remark in told)])
 
 
+def write_times(path: Path) -> str:
+    """Make the timing table of a results folder.
+
+    Returns:
+        What is to be printed: the table over all scenarios, and which cells are not stable.
+
+    Raises:
+        DikbenchError: if the folder holds no results.
+    """
+    with ResultsFolder(path).open_store() as store:
+        times = store.times()
+    shown = _written(path, "timing", times.assign(status="ok"))
+    unstable = times[times["timing_verdict"] != STABLE]
+    told = [
+        f"- {row.formulation} with {row.solver} on {row.scenario}: {row.timing_verdict}."
+        for row in unstable.itertuples()
+    ]
+    return "\n".join([f"{shown['title']}\n\n{shown['rows']}\n", *told])
+
+
+def _written(path: Path, name: str, trials: pd.DataFrame) -> dict[str, str]:
+    """Write one of the tables, and give its part over all families."""
+    kind = TABLES[name]
+    table = make_table(kind, trials)
+    (path / "tables").mkdir(exist_ok=True)
+    table.to_csv(path / "tables" / f"{name}.csv", index=False)
+    (path / "tables" / f"{name}.md").write_text(to_markdown(kind, table))
+    rows = table[table["family"] == ALL].drop(columns="family")
+    text = markdown_rows(rows) if len(rows) else "Nothing was measured."
+    return {"name": name, "title": kind.title, "rows": text}
+
+
 def remarks(trials: pd.DataFrame) -> list[str]:
     """What a reader must know before believing the tables, generated from the rows."""
     found = []
     if trials["law_time_median_us"].notna().any():
-        found.append("Times are cold calls, in one run on one machine: compare ratios.")
+        found.append(
+            "Times are of one run on one machine: compare ratios. Solvers are called cold, through "
+            "qpsolvers, where their selector does not say interface=warm."
+        )
+        cells = trials.drop_duplicates([*LAW, "scenario"])["timing_verdict"].dropna()
+        unstable = int((cells != STABLE).sum())
+        if unstable:
+            found.append(
+                f"Of {len(cells)} timed cells {unstable} are not stable (timing.csv says why); "
+                "`dikbench time` takes them anew, on a machine that does nothing else."
+            )
+    wall, control = trials["wall_time_s"].sum(), trials["control_time_s"].sum()
+    if wall > 0:
+        found.append(
+            f"Of the workers' time {100 * control / wall:.0f} % went into kinematics, laws and "
+            "solvers, the rest into the harness (plant, records, recheck, metrics, traces)."
+        )
     if trials["reference"].eq("time").all():
         found.append(
             "The reference moved on with the clock: laws that slow down fall behind by design. "

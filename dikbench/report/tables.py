@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -25,12 +25,12 @@ class Column:
 
     Attributes:
         of: column of trials.csv.
-        how: `median`, `max` or `min` over the trials of the row.
+        how: over the trials of the row: `median`, `max`, `min`, or a function of the values.
         heading: what stands above it.
     """
 
     of: str
-    how: str
+    how: str | Callable[[pd.Series], float]
     heading: str
 
 
@@ -45,6 +45,11 @@ class TableKind:
 
     title: str
     columns: Sequence[Column]
+
+
+def _unstable(verdicts: pd.Series) -> int:
+    """Number of cells whose times cannot be trusted."""
+    return int((verdicts.notna() & (verdicts != "stable")).sum())
 
 
 TABLES: Mapping[str, TableKind] = MappingProxyType(
@@ -80,8 +85,15 @@ TABLES: Mapping[str, TableKind] = MappingProxyType(
             "Timing of one call of the law: median over scenarios",
             (
                 Column("law_time_median_us", "median", "median [us]"),
+                Column("law_own_time_median_us", "median", "of it law [us]"),
+                Column("solver_core_time_median_us", "median", "solver [us]"),
+                Column("solver_wrapper_time_median_us", "median", "wrapper [us]"),
+                Column("kinematics_time_median_us", "median", "kinematics beside it [us]"),
                 Column("law_time_p99_us", "median", "p99 [us]"),
-                Column("solve_time_median_us", "median", "of it solving [us]"),
+                Column("law_time_p999_us", "median", "p99.9 [us]"),
+                Column("law_time_max_us", "max", "longest [us]"),
+                Column("missed_1000_hz_share", "max", "missed at 1 kHz, worst"),
+                Column("timing_verdict", _unstable, "unstable"),
             ),
         ),
     }

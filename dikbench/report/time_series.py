@@ -15,7 +15,6 @@ from dikbench.report.style import look, save
 from dikbench.run.results import ResultsFolder
 from dikbench.scenario import Scenario
 from dikbench.trace import Trace
-from dikbench.trial import Trial
 
 LEAST = 1e-3
 """Nothing below this [mm, or share of a limit] is drawn: the axes are logarithmic."""
@@ -37,7 +36,7 @@ def draw_time_series(
     traces = {
         row.formulation: Trace.load(path)
         for row in chosen.itertuples()
-        if (path := folder.traces / f"{_trial(row).id}.arrow").is_file()
+        if (path := folder.trace(str(row.id))).is_file()
     }
     if not traces:
         return None
@@ -56,10 +55,6 @@ def draw_time_series(
     lower.set_xlabel("time [s]")
     figure.legend(*upper.get_legend_handles_labels(), loc="outside right upper")
     return save(figure, target, "error_and_speed_against_time")
-
-
-def _trial(row: object) -> Trial:
-    return Trial(*(getattr(row, key) for key in Trial.__dataclass_fields__))
 
 
 def _speed_ratio(trace: Trace, scenario: Scenario) -> Array:

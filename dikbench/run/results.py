@@ -1,51 +1,48 @@
-"""The results of a run as files: trials.csv, manifest.json, traces."""
+"""A results folder: the store, its exports, the traces."""
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from filelock import FileLock, Timeout
 
 from dikbench.errors import DikbenchError
-from dikbench.metrics import METRICS
-from dikbench.run.worker import Row
-
-KEYS = ("formulation", "solver", "scenario", "plant", "reference", "seed", "status", "message")
-TIMES = {
-    "law_time_median_us": "median time of one call of the law, its solver included [us]",
-    "law_time_p99_us": "99 % quantile of it [us]",
-    "solve_time_median_us": "median of the part inside the solver and its interface [us]",
-    "timing_samples": "number of calls timed",
-}
-CELL = ["formulation", "solver", "scenario"]
+from dikbench.run.store import Store
 
 
-@dataclass(frozen=True)
 class ResultsFolder:
-    """Where a run writes."""
+    """Where a run writes.
 
-    path: Path
+    Attributes:
+        path: the folder.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path.absolute()
 
     @property
     def traces(self) -> Path:
         """One compressed file of arrays per trial."""
         return self.path / "traces"
 
-    @property
-    def trials(self) -> Path:
-        """The table of trials."""
-        return self.path / "trials.csv"
+    def trace(self, trial: str) -> Path:
+        """The trace of a trial, by its id."""
+        return self.traces / f"{trial}.arrow"
 
-    def prepare(self) -> None:
-        """Make the folder, and make sure that it can be written; earlier results stay.
+    @property
+    def database(self) -> Path:
+        """The file of the store."""
+        return self.path / "results.sqlite"
+
+    def lock(self) -> FileLock:
+        """Keep other runs out of the folder, making it where it is missing.
 
         Raises:
-            DikbenchError: if it cannot.
+            DikbenchError: if it cannot be written, or another run is at work in it.
         """
         try:
             self.traces.mkdir(parents=True, exist_ok=True)
@@ -54,38 +51,60 @@ class ResultsFolder:
             raise DikbenchError(f"output folder {self.path} cannot be written: {reason}") from None
         if not os.access(self.path, os.W_OK | os.X_OK) or not os.access(self.traces, os.W_OK):
             raise DikbenchError(f"output folder {self.path} cannot be written: permission denied")
+        lock = FileLock(self.path / "run.lock")
+        try:
+            lock.acquire(timeout=0)
+        except Timeout:
+            raise DikbenchError(
+                f"output folder {self.path}: another run is at work in it; wait for it or choose "
+                "another folder with --out"
+            ) from None
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise DikbenchError(f"output folder {self.path} cannot be locked: {reason}") from None
+        return lock
 
-    def forget_traces_but(self, names: Collection[str]) -> None:
-        """Remove the traces of an earlier run into this folder: they belong to no row any more."""
-        for path in self.traces.glob("*.arrow"):
-            if path.stem not in names:
-                path.unlink()
+    def open_store(self) -> Store:
+        """The store that is there already.
 
-    def write(self, rows: Sequence[Row], times: Sequence[Row], manifest: dict[str, Any]) -> None:
-        """Write the table and the manifest; each replaces its predecessor in one move."""
-        columns = [*KEYS, "steps", *METRICS, *TIMES]
-        frame = pd.DataFrame(list(rows))
-        if times:
-            frame = frame.merge(pd.DataFrame(list(times)), on=CELL, how="left")
-        frame = frame.reindex(columns=columns)
-        _replace(self.trials, frame.to_csv(index=False))
-        text = json.dumps(manifest, indent=2, ensure_ascii=False) + "\n"
-        _replace(self.path / "manifest.json", text)
+        Raises:
+            DikbenchError: if there is none, or it cannot be read.
+        """
+        if not self.database.is_file():
+            raise DikbenchError(f"no results in {self.path}: {self.database.name} is missing")
+        return Store(self.database)
+
+    def export(self, store: Store) -> None:
+        """Write the trials as CSV and Parquet, the times as CSV, and the manifest.
+
+        Raises:
+            DikbenchError: if they cannot be written.
+        """
+        trials = store.trials()
+        try:
+            _replace(self.path / "trials.csv", trials.to_csv(index=False).encode())
+            _replace(self.path / "timing.csv", store.times().to_csv(index=False).encode())
+            _replace(self.path / "trials.parquet", trials.to_parquet(index=False))
+            text = json.dumps(store.manifest(), indent=2, ensure_ascii=False) + "\n"
+            _replace(self.path / "manifest.json", text.encode())
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise DikbenchError(
+                f"output folder {self.path}: {reason}; the store keeps what was committed"
+            ) from None
 
     def read(self) -> tuple[pd.DataFrame, dict[str, Any]]:
-        """The table of trials and the manifest.
+        """The trials of the last run, and the manifest.
 
         Raises:
             DikbenchError: if the folder holds no results.
         """
-        if not self.trials.is_file():
-            raise DikbenchError(f"no results in {self.path}: trials.csv is missing")
-        frame = pd.read_csv(self.trials, keep_default_na=True)
-        frame["message"] = frame["message"].fillna("")
-        return frame, json.loads((self.path / "manifest.json").read_text())
+        with self.open_store() as store:
+            return store.trials(), store.manifest()
 
 
-def _replace(path: Path, text: str) -> None:
+def _replace(path: Path, content: bytes) -> None:
+    """Write a file in one move."""
     partial = path.with_name(path.name + ".partial")
-    partial.write_text(text)
+    partial.write_bytes(content)
     partial.replace(path)

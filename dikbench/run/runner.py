@@ -1,116 +1,271 @@
-"""The run of a study: trials in parallel, then times on one core, then the files."""
+"""The run of a study: trials in parallel, then times on one core; every row committed at once."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
-from concurrent.futures import Future, as_completed
+from collections.abc import Collection, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from dataclasses import dataclass
+from itertools import islice
+from multiprocessing import active_children
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
+import msgspec
 from pebble import ProcessExpired
 
-from dikbench.run.manifest import manifest
+from dikbench.errors import DikbenchError
 from dikbench.run.progress_display import ProgressDisplay
+from dikbench.run.provenance import environment, git_commit, manifest
 from dikbench.run.results import ResultsFolder
+from dikbench.run.store import Store
 from dikbench.run.timing import Cell, time_scenario
-from dikbench.run.worker import Row, row_without_run, run_trial
-from dikbench.run.workers import workers
+from dikbench.run.worker import CannotStore, Row, TracePolicy, row_without_run, work
+from dikbench.run.workers import end_group, workers
+from dikbench.selector import parse_selector
 from dikbench.status import Status
 from dikbench.study import PlannedTrial, Study, expand
+from dikbench.trial import Trial
 
-TRIAL_TIMEOUT = 120.0
-"""Wall-clock limit of a trial [s], enforced from outside its process."""
-
-TIMING_TIMEOUT = 1800.0
+TIMING_TIMEOUT: Final = 1800.0
 """Wall-clock limit of the timing of one scenario [s]."""
 
+AHEAD: Final = 8
+"""Trials per worker that are handed over ahead: no worker waits, and memory does not grow."""
 
-def run_study(study: Study, out: Path, jobs: int, command: str) -> ResultsFolder:
-    """Run a study and write trials.csv, manifest.json and the traces.
+
+class Interrupted(Exception):
+    """The user stopped the run; says how much is kept."""
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """How a study is run.
+
+    Attributes:
+        jobs: number of worker processes.
+        trial_timeout: wall-clock limit of a trial [s], enforced from outside its process.
+        trial_memory: memory of a trial beyond what its process has at the start [MB].
+        traces: which traces are kept.
+        rerun: which finished trials are run again: "", "failed", "all", or the selector (or the
+            name) of a formulation, scenario or solver.
+    """
+
+    jobs: int
+    trial_timeout: float = 120.0
+    trial_memory: int = 4096
+    traces: TracePolicy = "all"
+    rerun: str = ""
+
+
+def run_study(study: Study, out: Path, settings: RunSettings, command: str) -> ResultsFolder:
+    """Run what is missing of a study in a results folder: trials, then times.
 
     Args:
         study: what to run.
-        out: results folder.
-        jobs: number of worker processes.
+        out: results folder; what it holds already is kept.
+        settings: how.
         command: the command line, for the manifest.
 
     Raises:
-        DikbenchError: before anything runs, if the study or the folder is not valid.
+        DikbenchError: if the study or the folder is not valid, before anything runs; if the store
+            fails, after what was committed.
+        Interrupted: if the user stops the run; what is finished is kept.
     """
     planned = expand(study)
     folder = ResultsFolder(out)
-    folder.prepare()
-    description = manifest(study, len(planned), command)
-    rows = run_trials(planned, folder.traces, jobs)
-    times = time_cells(study, planned) if study.timing is not None else []
-    folder.write(rows, times, description)
-    folder.forget_traces_but({p.trial.id for p in planned})
+    with folder.lock(), Store(folder.database) as store:
+        commit = git_commit()
+        described = environment(commit, command)
+        run = store.begin_run(manifest(study, len(planned), described), planned)
+        done = store.statuses()
+        todo = [p for p in planned if p.id not in done or _again(p, done[p.id], settings.rerun)]
+        if len(todo) < len(planned):
+            print(f"{len(planned) - len(todo)} of {len(planned)} trials are done", file=sys.stderr)
+        try:
+            _run_trials(store, run, folder, todo, settings, commit, command, planned)
+            if study.timing is not None:
+                again = settings.rerun == "all"
+                _time(store, run, study, planned, again=again)
+        except KeyboardInterrupt:
+            finished = sum(p.id in store.statuses() for p in planned)
+            folder.export(store)
+            raise Interrupted(f"{finished} of {len(planned)} trials are done and kept") from None
+        folder.export(store)
+        store.close_neatly()
     return folder
 
 
-def run_trials(planned: Sequence[PlannedTrial], traces: Path, jobs: int) -> list[Row]:
-    """Run every trial in worker processes; the rows are in the order of the plan."""
-    rows: dict[int, Row] = {}
-    with workers(jobs) as pool, ProgressDisplay(len(planned), "trials") as display:
-        futures: dict[Future[Row], int] = {}
-        for index, (trial, skip) in enumerate((p.trial, p.skip) for p in planned):
-            if skip:
-                rows[index] = row_without_run(trial, Status.SKIPPED, skip)
-                display.advance()
-            else:
-                future = pool.schedule(run_trial, args=(trial, traces), timeout=TRIAL_TIMEOUT)
-                futures[future] = index
-        for future in as_completed(futures):
-            index = futures[future]
-            rows[index] = _row(future, planned[index])
+def time_study(study: Study, out: Path, command: str) -> ResultsFolder:
+    """Take the times of a study anew, and nothing else.
+
+    Args:
+        study: whose cells are timed.
+        out: results folder; trials that it holds are kept.
+        command: the command line, for the manifest.
+
+    Raises:
+        DikbenchError: if the study or the folder is not valid.
+        Interrupted: if the user stops the run.
+    """
+    if study.timing is None:
+        raise DikbenchError(f"study {study.name} has no section [timing]: add one to take times")
+    planned = expand(study)
+    folder = ResultsFolder(out)
+    with folder.lock(), Store(folder.database) as store:
+        described = environment(git_commit(), command)
+        run = store.begin_run(manifest(study, len(planned), described), planned)
+        try:
+            _time(store, run, study, planned, again=True)
+        except KeyboardInterrupt:
+            raise Interrupted(f"{len(store.timed())} cells are timed and kept") from None
+        folder.export(store)
+        store.close_neatly()
+    return folder
+
+
+def _again(planned: PlannedTrial, status: str, rerun: str) -> bool:
+    """Whether a finished trial is to be run again."""
+    if rerun == "failed":
+        return status not in {Status.OK.value, Status.SKIPPED.value}
+    trial = planned.trial
+    selectors = (trial.formulation, trial.scenario, trial.solver)
+    return rerun == "all" or any(
+        rerun in {selector, parse_selector(selector).name} for selector in selectors
+    )
+
+
+def _run_trials(
+    store: Store,
+    run: int,
+    folder: ResultsFolder,
+    todo: Sequence[PlannedTrial],
+    settings: RunSettings,
+    commit: str | None,
+    command: str,
+    planned: Sequence[PlannedTrial],
+) -> None:
+    """Run trials in worker processes and commit each row as it comes."""
+    positions = {p.id: number for number, p in enumerate(planned)}
+    with ProgressDisplay(len(todo), "trials") as display:
+        for trial, row in run_trials(todo, folder, settings, commit, command):
+            described = row.pop("described", None)
+            row["environment"] = None if described is None else store.environment(described)
+            store.record_trial({"id": trial.id, **row}, run, positions[trial.id])
             display.advance()
-    return [rows[index] for index in range(len(planned))]
 
 
-def _row(future: Future[Row], planned: PlannedTrial) -> Row:
+def run_trials(
+    todo: Sequence[PlannedTrial],
+    folder: ResultsFolder,
+    settings: RunSettings,
+    commit: str | None = None,
+    command: str = "",
+) -> Iterator[tuple[PlannedTrial, Row]]:
+    """Run trials in worker processes; the rows come as they finish.
+
+    Raises:
+        DikbenchError: if a trace cannot be written.
+    """
+    skipped = [p for p in todo if p.skip]
+    yield from ((p, row_without_run(p.trial, Status.SKIPPED, p.skip)) for p in skipped)
+    # Scenario by scenario: a worker builds each once.
+    first: dict[tuple[str, int], int] = {}
+    for p in todo:
+        first.setdefault((p.trial.scenario, p.trial.seed), len(first))
+    waiting = iter(
+        sorted((p for p in todo if not p.skip), key=lambda p: first[p.trial.scenario, p.trial.seed])
+    )
+    processes: set[int] = set()
+    try:
+        with workers(settings.jobs, settings.trial_memory) as pool:
+            running: dict[Future[Any], PlannedTrial] = {}
+            while True:
+                for p in islice(waiting, AHEAD * settings.jobs - len(running)):
+                    arguments = (p.trial, folder.trace(p.id), settings.traces, commit, command)
+                    future = pool.schedule(work, args=arguments, timeout=settings.trial_timeout)
+                    running[future] = p
+                if not running:
+                    return
+                processes.update(child.pid for child in active_children() if child.pid)
+                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                    p = running.pop(future)
+                    yield p, _row(future, p.trial, settings.trial_timeout)
+    finally:
+        for process in processes:
+            end_group(process)
+
+
+def _row(future: Future[Any], trial: Trial, timeout: float) -> Row:
     """The row of a finished trial, whatever became of it."""
     try:
-        return future.result()
+        row, described = future.result()
+    except CannotStore:
+        raise
     except TimeoutError:
-        reason = f"not finished after {TRIAL_TIMEOUT:g} s"
-        return row_without_run(planned.trial, Status.TIMEOUT, reason)
+        return row_without_run(trial, Status.TIMEOUT, f"not finished after {timeout:g} s")
     except ProcessExpired as error:
         reason = f"the worker ended with exit code {error.exitcode}"
-        return row_without_run(planned.trial, Status.CRASHED, reason)
+        return row_without_run(trial, Status.CRASHED, reason)
     except MemoryError:
-        return row_without_run(planned.trial, Status.OUT_OF_MEMORY, "out of memory")
+        return row_without_run(trial, Status.OUT_OF_MEMORY, "out of memory")
     except Exception as error:
         reason = f"{type(error).__name__}: {error}".partition("\n")[0]
-        return row_without_run(planned.trial, Status.FORMULATION_ERROR, reason)
+        return row_without_run(trial, Status.FORMULATION_ERROR, reason)
+    return {**row, "described": described}
 
 
-def time_cells(study: Study, planned: Sequence[PlannedTrial]) -> list[Row]:
-    """The timing pass, in one process of its own after all trials have ended."""
-    timing = study.timing
-    assert timing is not None
+def _time(
+    store: Store, run: int, study: Study, planned: Sequence[PlannedTrial], *, again: bool
+) -> None:
+    """The timing pass, in one process of its own when no trial runs."""
     cells: list[Cell] = list(
         dict.fromkeys((p.trial.formulation, p.trial.solver) for p in planned if not p.skip)
     )
-    scenarios = [s for s in study.scenarios if not timing.scenarios or s in timing.scenarios]
-    rows: list[Row] = []
-    if not cells:
-        return rows
+    timing = study.timing
+    if not cells or timing is None:
+        return
+    known: Collection[tuple[str, str, str]] = set() if again else store.timed()
+    scenarios = [
+        scenario
+        for scenario in study.scenarios
+        if (not timing.scenarios or scenario in timing.scenarios)
+        and any((*cell, scenario) not in known for cell in cells)
+    ]
+    if not scenarios:
+        return
+    arguments = (cells, timing.reference, timing.problems, timing.rounds)
     with workers(1) as pool, ProgressDisplay(len(scenarios), "timed scenarios") as display:
-        arguments: tuple[Any, ...] = (cells, timing.reference, timing.problems, timing.rounds)
-        futures = [
-            pool.schedule(
-                time_scenario,
-                args=(scenario, study.seeds[0], *arguments),
-                timeout=TIMING_TIMEOUT,
+        futures = {
+            scenario: pool.schedule(
+                time_scenario, args=(scenario, study.seeds[0], *arguments), timeout=TIMING_TIMEOUT
             )
             for scenario in scenarios
-        ]
-        for scenario, future in zip(scenarios, futures, strict=True):
+        }
+        for scenario, future in futures.items():
+            rows: list[Row] = []
             try:
-                rows.extend(future.result())
+                rows = future.result()
             except Exception as error:  # a law can take the process with it: no times, no harm
                 reason = f"{type(error).__name__}: {error}".partition("\n")[0]
                 print(f"no times for {scenario}: {reason}", file=sys.stderr)
+            for row in rows:
+                store.record_times(row, run)
             display.advance()
-    return rows
+
+
+def status_of(out: Path) -> dict[str, int]:
+    """How many trials of the last study are done, by status, and how many are missing.
+
+    Raises:
+        DikbenchError: if the folder holds no results.
+    """
+    folder = ResultsFolder(out)
+    with folder.open_store() as store:
+        described, done = store.manifest(), store.statuses()
+    study = msgspec.convert(described["study"], Study)
+    counts: dict[str, int] = {}
+    for p in expand(study):
+        status = done.get(p.id, "missing")
+        counts[status] = counts.get(status, 0) + 1
+    return counts

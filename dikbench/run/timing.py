@@ -5,26 +5,37 @@ from __future__ import annotations
 import gc
 import os
 import random
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from time import perf_counter_ns
+from typing import Final
 
 import numpy as np
 
 from dikbench.array import Array
 from dikbench.control_step import TrialEnded, control_step
+from dikbench.kinematics import Kinematics
 from dikbench.plants import PLANTS
 from dikbench.problem import DikProblem, Formulation, Solve
 from dikbench.registry import make_formulation
+from dikbench.run.columns import RATES
+from dikbench.run.stability import verdict
 from dikbench.run.worker import Row, scenario_of, solve_of
 from dikbench.scenario import Scenario
 from dikbench.simulation import simulate
 from dikbench.solvers.checked import CheckedSolve, make_solve
+from dikbench.tasks import PoseTask
 
-WARM_UP = 10
-"""Problems that each cell solves before its clock counts."""
+LEAD_IN: Final = 5
+"""Problems that are replayed before each timed segment: they bring back what another cell drove out
+of the caches, and a warm start to where the segment begins."""
 
 Cell = tuple[str, str]
 """The selectors of a law and its solver."""
+
+PARTS: Final = ("law", "own", "core", "wrapper")
+"""The whole call of the law; of it the law's own, the solver library's and its wrapper's share."""
 
 
 @dataclass(frozen=True)
@@ -53,8 +64,8 @@ def time_scenario(
 ) -> list[Row]:
     """Time every cell on one scenario's problems.
 
-    The cells are interleaved and shuffled in every round, so that drift of the machine hits all
-    alike; each sample is one call of the law, its solver included, the recheck excluded.
+    In every round each cell solves the whole segment, in a new random order of the cells, so that
+    drift of the machine hits all alike. A sample is one call of the law with its solver.
 
     Args:
         selector: the scenario.
@@ -65,67 +76,108 @@ def time_scenario(
         rounds: how often each cell solves all of them.
 
     Returns:
-        A row per cell: law_time_median_us, law_time_p99_us, solve_time_median_us (of it, inside
-        the solver and its interface), timing_samples.
+        A row per cell (see `dikbench.run.columns`).
     """
-    segment = record_problems(scenario_of(selector, seed), make_formulation(reference), problems)
+    scenario = scenario_of(selector, seed)
+    segment = record_problems(scenario, make_formulation(reference), problems)
     laws = [(make_formulation(law), solve_of(law, solver, checks=False)) for law, solver in cells]
-    law_ns = np.full((len(cells), rounds, len(segment)), np.nan)
-    solve_ns = np.full_like(law_ns, np.nan)
-    order = list(range(len(cells)))
+    samples = np.full((len(cells), len(PARTS), rounds, len(segment)), np.nan)
+    kinematics = np.full((rounds, len(segment)), np.nan)
+    order = list(range(-1, len(cells)))  # -1: the kinematics, which all cells share
     shuffle = random.Random(0).shuffle
-    _pin()
-    gc.collect()
-    gc.disable()
-    try:
-        for law, solve in laws:
-            _replay(law, solve, segment[:WARM_UP])
-        for turn in range(rounds):
+    with undisturbed():
+        for turn in range(-1, rounds):  # the first round warms up
             shuffle(order)
             for index in order:
-                law, solve = laws[index]
-                for k, (total, inside) in enumerate(_replay(law, solve, segment)):
-                    law_ns[index, turn, k], solve_ns[index, turn, k] = total, inside
-    finally:
-        gc.enable()
+                if index < 0:
+                    found = _time_kinematics(scenario, segment)
+                    kinematics[max(turn, 0)] = found
+                else:
+                    samples[index, :, max(turn, 0)] = _replay(*laws[index], segment)
     return [
         {
             "formulation": law,
             "solver": solver,
             "scenario": selector,
-            **_summary(law_ns[index].ravel(), solve_ns[index].ravel()),
+            **_summary(samples[index], kinematics),
         }
         for index, (law, solver) in enumerate(cells)
     ]
 
 
-def _replay(
-    law: Formulation, solve: CheckedSolve, segment: Sequence[DikProblem]
-) -> list[tuple[int, int]]:
-    """Time the law on each problem: (whole call, inside the solver) [ns]; short if it breaks."""
-    samples = []
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """Keep this process on one core, where the system lets us, and the garbage collector away."""
+    cores = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set()
+    if cores:
+        os.sched_setaffinity(0, {max(cores)})
+    gc.collect()
+    gc.disable()
     try:
+        yield
+    finally:
+        gc.enable()
+        if cores:
+            os.sched_setaffinity(0, cores)
+
+
+def _replay(law: Formulation, solve: CheckedSolve, segment: Sequence[DikProblem]) -> Array:
+    """Time the law on each problem, (parts, problems) [ns]; NaN from where it breaks on."""
+    times = np.full((len(PARTS), len(segment)), np.nan)
+    found = []
+    try:
+        for problem in segment[:LEAD_IN]:
+            control_step(law, problem, solve)
         for problem in segment:
             outcome = control_step(law, problem, solve)
-            samples.append((outcome.law_ns, solve.solve_ns))
+            found.append((outcome.law_ns, solve.solve_ns, solve.core_ns))
     except TrialEnded:
         pass
-    return samples
+    if found:
+        whole, inside, core = np.array(found, dtype=float).T
+        times[:, : len(found)] = whole, whole - inside, core, inside - core
+    return times
 
 
-def _summary(law_ns: Array, solve_ns: Array) -> Row:
-    timed = ~np.isnan(law_ns)
-    if not timed.any():
+def _time_kinematics(scenario: Scenario, segment: Sequence[DikProblem]) -> Array:
+    """Time of setting each problem up again, (problems,) [ns], as `simulate` does it."""
+    robot, tracking = scenario.robot, PoseTask(gain=scenario.gain)
+    kinematics = Kinematics(robot)
+    found = []
+    for number, given in enumerate(segment):
+        target, twist = scenario.targets[number % len(scenario.targets)]
+        start = perf_counter_ns()
+        kinematics.update(given.q)
+        tasks = [tracking.linearize(kinematics, target, twist)]
+        for secondary in scenario.tasks:
+            tasks.append(secondary.linearize(kinematics))
+        DikProblem(robot, given.q, given.v_prev, given.dt, tasks, robot.limits.at(given.q))
+        found.append(perf_counter_ns() - start)
+    return np.array(found, dtype=float)
+
+
+def _summary(samples: Array, kinematics: Array) -> Row:
+    """What is reported of one cell: samples (parts, rounds, problems), kinematics, all [ns]."""
+    law = samples[PARTS.index("law")]
+    timed = law[~np.isnan(law)] / 1e3
+    if not len(timed):
         return {}
+    own, core, wrapper = (
+        float(np.nanmedian(samples[PARTS.index(part)])) / 1e3 for part in ("own", "core", "wrapper")
+    )
+    shared = float(np.median(kinematics)) / 1e3
     return {
-        "law_time_median_us": float(np.median(law_ns[timed])) / 1e3,
-        "law_time_p99_us": float(np.quantile(law_ns[timed], 0.99)) / 1e3,
-        "solve_time_median_us": float(np.median(solve_ns[timed])) / 1e3,
-        "timing_samples": int(timed.sum()),
+        "kinematics_time_median_us": shared,
+        "law_time_median_us": float(np.median(timed)),
+        "law_own_time_median_us": own,
+        "solver_core_time_median_us": core,
+        "solver_wrapper_time_median_us": wrapper,
+        "law_time_p99_us": float(np.quantile(timed, 0.99)),
+        "law_time_p999_us": float(np.quantile(timed, 0.999)),
+        "law_time_max_us": float(timed.max()),
+        **{
+            f"missed_{rate}_hz_share": float(np.mean(timed + shared > 1e6 / rate)) for rate in RATES
+        },
+        "timing_samples": len(timed),
+        "timing_verdict": verdict(law),
     }
-
-
-def _pin() -> None:
-    """Keep this process on one core, where the system lets us."""
-    if hasattr(os, "sched_setaffinity"):
-        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, Literal
 
 from dikbench.errors import DikbenchError
 from dikbench.metrics import evaluate
@@ -13,6 +15,8 @@ from dikbench.motion import recompute
 from dikbench.plants import PLANTS
 from dikbench.problem import program_of
 from dikbench.registry import make_formulation, make_scenario
+from dikbench.run.provenance import environment
+from dikbench.run.workers import calm_down
 from dikbench.scenario import Scenario
 from dikbench.simulation import ReferenceMode, simulate
 from dikbench.solvers.catalogue import parse_solver
@@ -22,6 +26,12 @@ from dikbench.trial import NO_SOLVER, Trial
 
 Row = dict[str, Any]
 """One trial as it stands in the table: column -> value."""
+
+TracePolicy = Literal["all", "failures", "none"]
+
+
+class CannotStore(DikbenchError):
+    """A trace cannot be written: the run has to end, with what is committed."""
 
 
 @lru_cache(maxsize=32)
@@ -54,16 +64,60 @@ def row_without_run(trial: Trial, status: Status, message: str) -> Row:
     return {**header(trial), "status": status.value, "message": message, "steps": 0}
 
 
-def run_trial(trial: Trial, traces: Path | None) -> Row:
+@lru_cache(maxsize=4)
+def _environment(commit: str | None, command: str) -> Row:
+    return environment(commit, command)
+
+
+def work(
+    trial: Trial, trace: Path, policy: TracePolicy, commit: str | None, command: str
+) -> tuple[Row, Row]:
+    """Run a trial in a worker process, whatever its plug-ins do.
+
+    Args:
+        trial: the cell.
+        trace: file for its trace.
+        policy: whether the trace is kept.
+        commit: see `environment`.
+        command: see `environment`.
+
+    Returns:
+        Its row, and the description of this process.
+
+    Raises:
+        CannotStore: if the trace cannot be written.
+    """
+    calm_down()
+    try:
+        row = run_trial(trial, trace, policy)
+    except CannotStore:
+        raise
+    except MemoryError as error:
+        row = row_without_run(trial, Status.OUT_OF_MEMORY, f"out of memory: {error}".rstrip(": "))
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}".partition("\n")[0]
+        row = row_without_run(trial, Status.FORMULATION_ERROR, reason)
+    except BaseException as error:  # such as SystemExit
+        reason = f"the law asked the process to end: {type(error).__name__}"
+        row = row_without_run(trial, Status.CRASHED, reason)
+    calm_down()
+    return row, _environment(commit, command)
+
+
+def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "all") -> Row:
     """Run one trial.
 
     Args:
         trial: the cell.
-        traces: folder for its trace, or None.
+        trace: file for its trace, or None.
+        policy: whether it is kept.
 
     Returns:
         Its row: keys, status, message, number of steps, every metric; `wall_time_s` of the run and
         of it `control_time_s`, in kinematics, law and solver (the rest is the harness's).
+
+    Raises:
+        CannotStore: if the trace cannot be written.
     """
     try:
         scenario = scenario_of(trial.scenario, trial.seed)
@@ -81,9 +135,11 @@ def run_trial(trial: Trial, traces: Path | None) -> Row:
         PLANTS[trial.plant],
         mode,
     )
-    if traces is not None:
-        run.trace.save(traces / f"{trial.id}.arrow")
-    metrics = {}
+    if trace is not None and (
+        policy == "all" or (policy == "failures" and run.status is not Status.OK)
+    ):
+        _keep(run.trace.save, trace)
+    metrics: Mapping[str, float] = {}
     if run.trace.steps:
         metrics = evaluate(recompute(run.trace, scenario, run.jacobians))
     return {
@@ -95,3 +151,15 @@ def run_trial(trial: Trial, traces: Path | None) -> Row:
         "wall_time_s": perf_counter() - start,
         "control_time_s": (run.kinematics_ns + run.law_ns) / 1e9,
     }
+
+
+def _keep(save: Any, path: Path) -> None:
+    """Write a trace in one move."""
+    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
+    try:
+        save(partial)
+        partial.replace(path)
+    except OSError as error:
+        partial.unlink(missing_ok=True)
+        reason = error.strerror or str(error)
+        raise CannotStore(f"trace {path} cannot be written: {reason}") from None

@@ -78,11 +78,11 @@ class Verdicts:
         stack = Stack(programs, answers)
         with np.errstate(invalid="ignore", over="ignore"):  # an answer may be anything
             found = residuals(stack)
-        distance = distance_to_optimum(programs, answers, found.nearness)
-        np.maximum.at(self.primal, steps, found.primal)
-        np.maximum.at(self.dual, steps, found.dual)  # what is not known stays NaN
-        np.maximum.at(self.gap, steps, found.gap)
-        np.maximum.at(self.distance, steps, distance)
+            distance = distance_to_optimum(programs, answers, found.nearness)
+            np.maximum.at(self.primal, steps, found.primal)
+            np.maximum.at(self.dual, steps, found.dual)  # what is not known stays NaN
+            np.maximum.at(self.gap, steps, found.gap)
+            np.maximum.at(self.distance, steps, distance)
         good = np.isfinite(stack.x).all(axis=1) & found.within(tolerance)
         good &= ~(distance > VERIFIED_DISTANCE)
         np.minimum.at(self.verified, steps, good.astype(int))

@@ -38,7 +38,8 @@ class Residuals:
     def within(self, tolerance: float) -> Mask:
         """Whether every residual that is known is within a tolerance, (k,)."""
         parts = (self.primal, self.dual, self.gap)
-        return np.all([~(part > tolerance) for part in parts], axis=0)
+        within: Mask = np.all([~(part > tolerance) for part in parts], axis=0)
+        return within
 
 
 def residuals(stack: Stack) -> Residuals:

@@ -51,7 +51,8 @@ class Stack:
 def _stacked(owners: Sequence[QuadraticProgram] | Sequence[Answer], part: str) -> Array:
     parts = [*map(attrgetter(part), owners)]
     if all(map(is_, parts, repeat(parts[0]))):  # such as bounds away from every limit
-        return np.broadcast_to(parts[0], (len(parts), *parts[0].shape))
+        shared = np.asarray(parts[0])
+        return np.broadcast_to(shared, (len(parts), *shared.shape))
     return np.array(parts)
 
 

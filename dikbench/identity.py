@@ -1,0 +1,85 @@
+"""What a trial is made of, as a hash: the same trial has the same id in any process, on any day."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import fields, is_dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from dikbench.registry import (
+    Plugin,
+    formulation_plugin,
+    make_formulation,
+    scenario_parameters,
+    scenario_plugin,
+)
+from dikbench.selector import parse_selector
+from dikbench.solvers.catalogue import parse_solver
+from dikbench.trial import NO_SOLVER, Trial
+
+
+def trial_id(trial: Trial) -> str:
+    """The id of a trial, 16 hexadecimal digits.
+
+    Made of the law and its parameters, the scenario family and its parameters, both with the
+    version of their source; the solver, how it is called and its settings; plant, reference mode
+    and seed. Selectors that mean the same (a default that is spelt out) give the same id.
+
+    Raises:
+        DikbenchError: if a selector does not name anything valid.
+    """
+    parts = (
+        _formulation(trial.formulation),
+        _scenario(trial.scenario),
+        _solver(trial.solver),
+        trial.plant,
+        trial.reference,
+        trial.seed,
+    )
+    return _digest(json.dumps(parts))
+
+
+@lru_cache(maxsize=4096)
+def _formulation(text: str) -> str:
+    law = make_formulation(text)
+    plugin = formulation_plugin(parse_selector(text).name)
+    names: list[str] = [field.name for field in fields(law)] if is_dataclass(law) else []
+    values = {name: repr(getattr(law, name)) for name in names}
+    return _digest(json.dumps([type(law).__qualname__, values, _source(plugin)], sort_keys=True))
+
+
+@lru_cache(maxsize=65536)
+def _scenario(text: str) -> str:
+    name = parse_selector(text).name
+    values = {key: repr(value) for key, value in scenario_parameters(text).items()}
+    return _digest(json.dumps([name, values, _source(scenario_plugin(name))], sort_keys=True))
+
+
+@lru_cache(maxsize=4096)
+def _solver(text: str) -> str:
+    if text == NO_SOLVER:
+        return text
+    solver = parse_solver(text)
+    settings: dict[str, Any] = {key: repr(value) for key, value in solver.settings.items()}
+    return _digest(
+        json.dumps([solver.name, solver.interface, settings, solver.tolerance], sort_keys=True)
+    )
+
+
+def _source(plugin: Plugin) -> str:
+    return _digest_of_file(plugin.file)
+
+
+@lru_cache(maxsize=256)
+def _digest_of_file(file: str) -> str:
+    try:
+        return _digest(Path(file).read_bytes().decode(errors="replace"))
+    except OSError:  # a class made at a prompt has no file
+        return ""
+
+
+def _digest(text: str) -> str:
+    return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()

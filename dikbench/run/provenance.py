@@ -1,0 +1,114 @@
+"""Where numbers come from: the machine, the versions, the commit, the command."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import platform
+import subprocess
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from dikbench.run.workers import THREAD_VARIABLES, available_cores
+from dikbench.solvers.catalogue import BACK_ENDS
+from dikbench.study import Study
+
+LIBRARIES = (
+    "dikbench", "pin", "example-robot-data", "numpy", "scipy", "qpsolvers", "cvxpy", "pandas",
+)  # fmt: skip
+
+
+def environment(commit: str | None, command: str) -> dict[str, Any]:
+    """Describe the process that asks: every row refers to the description of its worker.
+
+    Args:
+        commit: see `git_commit`, which asks once for all workers.
+        command: the command line, as typed.
+    """
+    solvers = {name: _version(entry.distribution) for name, entry in BACK_ENDS.items()}
+    return {
+        "command": command,
+        "git_commit": commit,
+        "python": platform.python_version(),
+        "system": platform.platform(),
+        "cpu": _cpu(),
+        "governor": _governor(),
+        "cores": available_cores(),
+        "threads": {name: os.environ.get(name) for name in THREAD_VARIABLES},
+        "blas": _blas(),
+        "libraries": {name: _version(name) for name in LIBRARIES},
+        "solvers": {name: version for name, version in solvers.items() if version},
+    }
+
+
+def manifest(study: Study, trials: int, description: dict[str, Any]) -> dict[str, Any]:
+    """Describe a run.
+
+    Args:
+        study: what was selected.
+        trials: number of trials.
+        description: the environment of the driver.
+    """
+    return {
+        "study": msgspec.to_builtins(study),
+        "trials": trials,
+        "seeds": list(study.seeds),
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+        **description,
+    }
+
+
+def git_commit() -> str | None:
+    """The commit of the checkout that dikbench runs from, "+" where it has changes; else None."""
+    try:
+        # A wheel inside somebody's checkout is not a part of it.
+        _git("ls-files", "--error-unmatch", Path(__file__).name)
+        return _git("rev-parse", "HEAD") + ("+" if _git("status", "--porcelain", "-uno") else "")
+    except (OSError, subprocess.SubprocessError):
+        return None
+
+
+def _version(distribution: str) -> str | None:
+    try:
+        return importlib.metadata.version(distribution)
+    except importlib.metadata.PackageNotFoundError:
+        return None
+
+
+def _cpu() -> str:
+    for line in _text("/proc/cpuinfo").splitlines():
+        if line.startswith("model name"):
+            return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
+
+
+def _governor() -> str | None:
+    return _text("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor").strip() or None
+
+
+def _text(path: str) -> str:
+    try:
+        return Path(path).read_text(errors="replace")
+    except OSError:  # not this system
+        return ""
+
+
+def _blas() -> str:
+    found: Any = np.show_config(mode="dicts")
+    blas = found.get("Build Dependencies", {}).get("blas", {})
+    return f"{blas.get('name', 'unknown')} {blas.get('version', '')}".strip()
+
+
+def _git(*arguments: str) -> str:
+    return subprocess.run(
+        ["git", "-C", str(Path(__file__).parent), *arguments],
+        capture_output=True,
+        text=True,
+        timeout=10,
+        check=True,
+        env={**os.environ, "GIT_OPTIONAL_LOCKS": "0"},
+    ).stdout.strip()

@@ -1,0 +1,230 @@
+"""The store of a results folder: one SQLite file, one row per trial, committed as it comes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sqlite3
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final, Self
+
+import pandas as pd
+
+from dikbench.errors import DikbenchError
+from dikbench.metrics import METRICS
+from dikbench.run.columns import CELL, KEYS, TIMES
+from dikbench.study import PlannedTrial
+
+SCHEMA: Final = 1
+"""Version of the tables below; another one is not read."""
+
+NUMBERS: Final = (*METRICS, "wall_time_s", "control_time_s")
+
+TABLES: Final = f"""
+CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL);
+CREATE TABLE runs (id INTEGER PRIMARY KEY, manifest TEXT NOT NULL);
+CREATE TABLE environments (id TEXT PRIMARY KEY, description TEXT NOT NULL);
+CREATE TABLE trials (
+  id TEXT PRIMARY KEY,
+  formulation TEXT NOT NULL, solver TEXT NOT NULL, scenario TEXT NOT NULL,
+  plant TEXT NOT NULL, reference TEXT NOT NULL, seed INTEGER NOT NULL,
+  status TEXT NOT NULL, message TEXT NOT NULL, steps INTEGER NOT NULL,
+  {", ".join(f"{name} REAL" for name in NUMBERS)},
+  environment TEXT REFERENCES environments (id),
+  run INTEGER NOT NULL REFERENCES runs (id),
+  position INTEGER
+);
+CREATE TABLE times (
+  formulation TEXT NOT NULL, solver TEXT NOT NULL, scenario TEXT NOT NULL,
+  {", ".join(f"{name} {kind}" for name, (kind, _) in TIMES.items())},
+  environment TEXT REFERENCES environments (id),
+  run INTEGER NOT NULL REFERENCES runs (id),
+  PRIMARY KEY (formulation, solver, scenario)
+);
+"""
+"""A trial's `position` is its place in the plan of the last run; without one it is not part of it,
+and is kept."""
+
+
+class Store:
+    """An open store; one process writes, committing every row, others may read."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        existed = path.is_file()
+        if existed and path.stat().st_size == 0:
+            raise DikbenchError(f"store {path}: the file is empty; remove it to start anew")
+        with self._guarded():
+            self._database = sqlite3.connect(path, isolation_level=None)
+            self._database.execute("PRAGMA journal_mode = WAL")
+            self._database.execute("PRAGMA synchronous = NORMAL")
+            if existed:
+                self._check_schema()
+            else:
+                with self._transaction():
+                    for statement in TABLES.split(";\n"):
+                        self._database.execute(statement)
+                    self._database.execute("INSERT INTO meta VALUES ('schema', ?)", [str(SCHEMA)])
+                self._database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        self._file = path.stat()
+        self._environments = {row[0] for row in self._rows("SELECT id FROM environments")}
+
+    def __enter__(self) -> Self:
+        """Use the store."""
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """Close it; what was committed stays."""
+        self._database.close()
+
+    def begin_run(self, manifest: Mapping[str, Any], planned: Sequence[PlannedTrial]) -> int:
+        """Note that a run begins; its plan says in which order rows are shown.
+
+        Returns:
+            The number of the run.
+        """
+        with self._guarded(), self._transaction():
+            cursor = self._database.execute(
+                "INSERT INTO runs (manifest) VALUES (?)", [json.dumps(manifest)]
+            )
+            self._place(planned)
+        return int(cursor.lastrowid or 0)
+
+    def _place(self, planned: Sequence[PlannedTrial]) -> None:
+        self._database.execute("UPDATE trials SET position = NULL")
+        self._database.executemany(
+            "UPDATE trials SET position = ? WHERE id = ?",
+            [(number, trial.id) for number, trial in enumerate(planned)],
+        )
+
+    def statuses(self) -> dict[str, str]:
+        """The status of every trial that has a row, by id."""
+        return dict(self._rows("SELECT id, status FROM trials"))
+
+    def timed(self) -> set[tuple[str, str, str]]:
+        """Formulation, solver and scenario of every cell that has times."""
+        return set(self._rows(f"SELECT {', '.join(CELL)} FROM times"))
+
+    def environment(self, description: Mapping[str, Any]) -> str:
+        """Keep the description of a process; the same one is kept once.
+
+        Returns:
+            Its name, for rows to refer to.
+        """
+        text = json.dumps(description, sort_keys=True)
+        name = hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
+        if name not in self._environments:
+            self._insert("environments", {"id": name, "description": text})
+            self._environments.add(name)
+        return name
+
+    def record_trial(self, row: Mapping[str, Any], run: int, position: int) -> None:
+        """Commit the row of a finished trial; an earlier one of the same trial is replaced."""
+        columns = ("id", *KEYS, "steps", *NUMBERS, "environment")
+        values = {name: row.get(name) for name in columns}
+        self._insert("trials", {**values, "run": run, "position": position})
+
+    def record_times(self, row: Mapping[str, Any], run: int) -> None:
+        """Commit the times of a cell."""
+        columns = (*CELL, *TIMES, "environment")
+        self._insert("times", {**{name: row.get(name) for name in columns}, "run": run})
+
+    def trials(self) -> pd.DataFrame:
+        """The trials of the last run's plan in its order, the times of their cells beside them."""
+        order = ", ".join(["id", *KEYS, "steps", *NUMBERS, "environment", "run"])
+        trials = self._frame(
+            f"SELECT {order} FROM trials WHERE position IS NOT NULL ORDER BY position", NUMBERS
+        )
+        return trials.merge(self.times(), on=CELL, how="left")
+
+    def times(self) -> pd.DataFrame:
+        """The times of every cell."""
+        numbers = [name for name, (kind, _) in TIMES.items() if kind == "REAL"]
+        return self._frame(f"SELECT {', '.join([*CELL, *TIMES])} FROM times", numbers)
+
+    def manifest(self) -> dict[str, Any]:
+        """The description of the last run.
+
+        Raises:
+            DikbenchError: if there was none.
+        """
+        rows = self._rows("SELECT manifest FROM runs ORDER BY id DESC LIMIT 1")
+        if not rows:
+            raise DikbenchError(f"store {self.path}: it holds no run")
+        found: dict[str, Any] = json.loads(rows[0][0])
+        return found
+
+    def close_neatly(self) -> None:
+        """Fold the write-ahead log into the file."""
+        with self._guarded():
+            self._database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+
+    def _frame(self, query: str, numbers: Sequence[str]) -> pd.DataFrame:
+        with self._guarded():
+            frame = pd.read_sql_query(query, self._database)
+        for name in numbers:
+            frame[name] = frame[name].astype(float)  # a column of NULLs has no type
+        return frame
+
+    def _rows(self, query: str) -> list[Any]:
+        with self._guarded():
+            return self._database.execute(query).fetchall()
+
+    def _insert(self, table: str, values: Mapping[str, Any]) -> None:
+        self._check_untouched()
+        marks = ", ".join("?" * len(values))
+        with self._guarded():
+            self._database.execute(
+                f"INSERT OR REPLACE INTO {table} ({', '.join(values)}) VALUES ({marks})",
+                list(values.values()),
+            )
+
+    @contextmanager
+    def _transaction(self) -> Iterator[None]:
+        self._database.execute("BEGIN IMMEDIATE")
+        try:
+            yield
+        except BaseException:
+            self._database.execute("ROLLBACK")
+            raise
+        self._database.execute("COMMIT")
+
+    @contextmanager
+    def _guarded(self) -> Iterator[None]:
+        try:
+            yield
+        except (sqlite3.Error, pd.errors.DatabaseError) as error:
+            reason = " ".join(str(error).split())
+            raise DikbenchError(
+                f"store {self.path}: {reason}; what was committed before is kept"
+            ) from error
+
+    def _check_schema(self) -> None:
+        try:
+            found = dict(self._database.execute("SELECT key, value FROM meta").fetchall())
+            columns = [row[1] for row in self._database.execute("PRAGMA table_info(trials)")]
+        except sqlite3.DatabaseError as error:
+            raise DikbenchError(f"store {self.path}: not a store of dikbench: {error}") from None
+        if found.get("schema") != str(SCHEMA):
+            raise DikbenchError(
+                f"store {self.path}: schema version {found.get('schema')!r} is not known; this "
+                f"dikbench reads version {SCHEMA}"
+            )
+        missing = set(NUMBERS) - set(columns)
+        if missing:
+            raise DikbenchError(
+                f"store {self.path}: written by a dikbench with other metrics (it lacks "
+                f"{min(missing)!r}); choose another folder"
+            )
+
+    def _check_untouched(self) -> None:
+        """A file that is removed or cut under an open database takes rows without a word."""
+        try:
+            now = self.path.stat()
+        except OSError:
+            raise DikbenchError(f"store {self.path}: it was removed during the run") from None
+        if now.st_ino != self._file.st_ino or now.st_size < self._file.st_size:
+            raise DikbenchError(f"store {self.path}: it was replaced or cut during the run")
+        self._file = now
