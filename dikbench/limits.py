@@ -22,6 +22,13 @@ class Interval:
     lower: Array
     upper: Array
 
+    def __post_init__(self) -> None:
+        """Keep laws from writing to limits that every later step and trial shares."""
+        for side in ("lower", "upper"):
+            bound = np.array(getattr(self, side), dtype=float)
+            bound.flags.writeable = False
+            object.__setattr__(self, side, bound)
+
     def usage(self, values: Array) -> Array:
         """Values (..., nv) over the bound on their own side; infinite past a bound of zero."""
         bound = np.abs(np.where(values > 0, self.upper, self.lower))

@@ -39,6 +39,12 @@ class Robot:
     task_rows: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
     available_acceleration: Array | None = None
 
+    def __post_init__(self) -> None:
+        """Keep laws from writing to the start, which every later trial shares."""
+        start = np.array(self.q0, dtype=float)
+        start.flags.writeable = False
+        object.__setattr__(self, "q0", start)
+
     @cached_property
     def frame_id(self) -> int:
         """Pinocchio's index of the task frame."""

@@ -155,9 +155,12 @@ def simulate(
             start = perf_counter_ns()
             kinematics.update(q)
             task = tracking.linearize(kinematics, target, twist)
+            task.J.flags.writeable = task.V.flags.writeable = False
             tasks = [task]
             for secondary in secondaries:
-                tasks.append(secondary.linearize(kinematics))
+                more = secondary.linearize(kinematics)
+                more.J.flags.writeable = more.V.flags.writeable = False
+                tasks.append(more)
             limits = limits_at(q)
             problem = DikProblem(robot, q, v_prev, dt, tasks, limits)
             kinematics_ns += perf_counter_ns() - start
@@ -170,7 +173,9 @@ def simulate(
             v = outcome.velocity
             if outcome.square > FASTEST**2:
                 raise TrialEnded(Status.DIVERGED, f"commanded speed above {FASTEST:g} rad/s")
+            v.flags.writeable = False  # it is recorded as it is
             applied = plant(v, limits, dt)
+            applied.flags.writeable = False
             if outcome.status is not ok:
                 record.status[k] = STEP_CODE[outcome.status]
             if problem.relaxed:
@@ -178,6 +183,7 @@ def simulate(
             if targets is None:
                 clock.advance(task.V, task.J @ applied)
             q = integrate(model, q, applied * dt)
+            q.flags.writeable = False
             record.commanded.append(v)
             record.applied.append(applied)
             record.q.append(q)

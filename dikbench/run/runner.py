@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
 from itertools import islice
@@ -15,6 +15,8 @@ import msgspec
 from pebble import ProcessExpired
 
 from dikbench.errors import DikbenchError
+from dikbench.identity import cell_id
+from dikbench.run.columns import CELL
 from dikbench.run.progress_display import ProgressDisplay
 from dikbench.run.provenance import environment, git_commit, manifest
 from dikbench.run.results import ResultsFolder
@@ -225,12 +227,12 @@ def _time(
     timing = study.timing
     if not cells or timing is None:
         return
-    known: Collection[tuple[str, str, str]] = set() if again else store.timed()
+    known: set[str] = set() if again else store.timed()
     scenarios = [
         scenario
         for scenario in study.scenarios
         if (not timing.scenarios or scenario in timing.scenarios)
-        and any((*cell, scenario) not in known for cell in cells)
+        and any(cell_id(*cell, scenario) not in known for cell in cells)
     ]
     if not scenarios:
         return
@@ -250,7 +252,7 @@ def _time(
                 reason = f"{type(error).__name__}: {error}".partition("\n")[0]
                 print(f"no times for {scenario}: {reason}", file=sys.stderr)
             for row in rows:
-                store.record_times(row, run)
+                store.record_times({"id": cell_id(*(row[key] for key in CELL)), **row}, run)
             display.advance()
 
 

@@ -16,6 +16,7 @@ from dikbench.errors import DikbenchError
 from dikbench.metrics import METRICS
 from dikbench.run.columns import CELL, KEYS, TIMES
 from dikbench.study import PlannedTrial
+from dikbench.trial import Trial
 
 SCHEMA: Final = 1
 """Version of the tables below; another one is not read."""
@@ -34,9 +35,10 @@ CREATE TABLE trials (
   {", ".join(f"{name} REAL" for name in NUMBERS)},
   environment TEXT REFERENCES environments (id),
   run INTEGER NOT NULL REFERENCES runs (id),
-  position INTEGER
+  position INTEGER, superseded INTEGER NOT NULL DEFAULT 0
 );
 CREATE TABLE times (
+  id TEXT NOT NULL,
   formulation TEXT NOT NULL, solver TEXT NOT NULL, scenario TEXT NOT NULL,
   {", ".join(f"{name} {kind}" for name, (kind, _) in TIMES.items())},
   environment TEXT REFERENCES environments (id),
@@ -44,8 +46,9 @@ CREATE TABLE times (
   PRIMARY KEY (formulation, solver, scenario)
 );
 """
-"""A trial's `position` is its place in the plan of the last run; without one it is not part of it,
-and is kept."""
+"""A trial's `position` is its place in the plan of the last run; without one it is not part of it
+and shown after it. It is `superseded`, kept but not shown, where the plan has a trial with the same
+selectors whose law or scenario has another source."""
 
 
 class Store:
@@ -95,17 +98,24 @@ class Store:
     def _place(self, planned: Sequence[PlannedTrial]) -> None:
         self._database.execute("UPDATE trials SET position = NULL")
         self._database.executemany(
-            "UPDATE trials SET position = ? WHERE id = ?",
+            "UPDATE trials SET position = ?, superseded = 0 WHERE id = ?",
             [(number, trial.id) for number, trial in enumerate(planned)],
         )
+        known = {tuple(row[1:]): row[0] for row in self._database.execute(
+            "SELECT id, formulation, solver, scenario, plant, reference, seed FROM trials "
+            "WHERE position IS NULL AND NOT superseded"
+        )}  # fmt: skip
+        now = (_selectors(p.trial) for p in planned)
+        old = [(known[selectors],) for selectors in now if selectors in known]
+        self._database.executemany("UPDATE trials SET superseded = 1 WHERE id = ?", old)
 
     def statuses(self) -> dict[str, str]:
         """The status of every trial that has a row, by id."""
         return dict(self._rows("SELECT id, status FROM trials"))
 
-    def timed(self) -> set[tuple[str, str, str]]:
-        """Formulation, solver and scenario of every cell that has times."""
-        return set(self._rows(f"SELECT {', '.join(CELL)} FROM times"))
+    def timed(self) -> set[str]:
+        """The ids of the cells that have times."""
+        return {row[0] for row in self._rows("SELECT id FROM times")}
 
     def environment(self, description: Mapping[str, Any]) -> str:
         """Keep the description of a process; the same one is kept once.
@@ -128,21 +138,24 @@ class Store:
 
     def record_times(self, row: Mapping[str, Any], run: int) -> None:
         """Commit the times of a cell."""
-        columns = (*CELL, *TIMES, "environment")
+        columns = ("id", *CELL, *TIMES, "environment")
         self._insert("times", {**{name: row.get(name) for name in columns}, "run": run})
 
     def trials(self) -> pd.DataFrame:
-        """The trials of the last run's plan in its order, the times of their cells beside them."""
+        """Every trial, those of the last run's plan first and in its order; times beside them."""
         order = ", ".join(["id", *KEYS, "steps", *NUMBERS, "environment", "run"])
         trials = self._frame(
-            f"SELECT {order} FROM trials WHERE position IS NOT NULL ORDER BY position", NUMBERS
+            f"SELECT {order} FROM trials WHERE NOT superseded "
+            f"ORDER BY position IS NULL, position, {', '.join(KEYS[:6])}",
+            NUMBERS,
         )
         return trials.merge(self.times(), on=CELL, how="left")
 
     def times(self) -> pd.DataFrame:
         """The times of every cell."""
         numbers = [name for name, (kind, _) in TIMES.items() if kind == "REAL"]
-        return self._frame(f"SELECT {', '.join([*CELL, *TIMES])} FROM times", numbers)
+        columns = ", ".join([*CELL, *TIMES])
+        return self._frame(f"SELECT {columns} FROM times ORDER BY {', '.join(CELL)}", numbers)
 
     def manifest(self) -> dict[str, Any]:
         """The description of the last run.
@@ -228,3 +241,14 @@ class Store:
         if now.st_ino != self._file.st_ino or now.st_size < self._file.st_size:
             raise DikbenchError(f"store {self.path}: it was replaced or cut during the run")
         self._file = now
+
+
+def _selectors(trial: Trial) -> tuple[str | int, ...]:
+    return (
+        trial.formulation,
+        trial.solver,
+        trial.scenario,
+        trial.plant,
+        trial.reference,
+        trial.seed,
+    )

@@ -64,7 +64,7 @@ def pink_tick(scenario: Scenario) -> Tick:
 
 
 def mink_tick(scenario: Scenario) -> Tick:
-    """mink on MuJoCo: `solve_ik` and `integrate_inplace`, daqp, position and velocity limits."""
+    """Mink on MuJoCo: `solve_ik` and `integrate_inplace`, daqp, position and velocity limits."""
     import mink
     import mujoco
 

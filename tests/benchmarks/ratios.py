@@ -170,7 +170,7 @@ def harness(trials: int) -> list[float]:
             wall = control = 0.0
             for law, solver in HARNESS_MIX:
                 trial = Trial(law, HARNESS_SCENARIO, solver, "ideal", "time", 0)
-                row = run_trial(trial, Path(folder))
+                row = run_trial(trial, Path(folder) / "trace.arrow")
                 wall += row["wall_time_s"]
                 control += row["control_time_s"]
             if number:
