@@ -8,3 +8,11 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
+
+
+def plain(array: Array) -> Array:
+    """The array, or a copy of one that is read-only, strided or in columns.
+
+    Some libraries take no such array, others take it for a plain one.
+    """
+    return array if array.flags.carray else np.array(array, order="C")

@@ -123,7 +123,7 @@ def solve_dik(
     v = outcome.velocity
     alpha = float(progress(main.V[None], (main.J @ v)[None], row_weights(robot.task_rows))[0])
     status, verdicts = outcome.status, solve.verdicts()
-    if status is Status.OK and verdicts.claimed[0] == 1 and verdicts.verified[0] == 0:
+    if status is Status.OK and verdicts.lied[0]:
         status = Status.NOT_VERIFIED
     if status is Status.OK and alpha < STUCK_PROGRESS:
         status = Status.STUCK

@@ -86,8 +86,7 @@ class _Recorder:
         achieved = np.einsum("kij,kj->ki", jacobians, commanded)
         alpha = progress(wanted, achieved, row_weights(scenario.robot.task_rows))
         status, ok = self.status[:n].copy(), STEP_CODE[Status.OK]
-        lied = (verdicts.claimed[:n] == 1) & (verdicts.verified[:n] == 0)
-        status[(status == ok) & lied] = STEP_CODE[Status.NOT_VERIFIED]
+        status[(status == ok) & verdicts.lied[:n]] = STEP_CODE[Status.NOT_VERIFIED]
         status[(status == ok) & (alpha < STUCK_PROGRESS)] = STEP_CODE[Status.STUCK]
         return Trace(
             scenario.dt,

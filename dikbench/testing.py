@@ -68,8 +68,7 @@ class _Asked:
         if outcome.status in {Status.INFEASIBLE, Status.SOLVER_FAILED}:
             return _Answer(None, outcome.status, outcome.status.sentence, 0.0)
         verdicts = solve.verdicts()
-        lied = verdicts.claimed[0] == 1 and verdicts.verified[0] == 0
-        status = Status.NOT_VERIFIED if lied else outcome.status
+        status = Status.NOT_VERIFIED if verdicts.lied[0] else outcome.status
         residual = float(verdicts.primal[0])
         return _Answer(outcome.velocity, status, status.sentence, residual)
 

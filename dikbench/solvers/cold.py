@@ -11,6 +11,7 @@ import numpy as np
 import qpsolvers
 from scipy.sparse import csc_matrix
 
+from dikbench.array import plain
 from dikbench.quadratic_program import QuadraticProgram
 from dikbench.solvers.answer import Answer
 from dikbench.solvers.catalogue import Solver
@@ -44,13 +45,13 @@ class ColdSolver:
             G, h = np.zeros((1, len(program.q))), np.ones(1)
         problem = qpsolvers.Problem(
             self._matrix(program.P),
-            program.q,
+            plain(program.q),
             self._matrix(G),
-            h,
+            None if h is None else plain(h),
             self._matrix(program.A),
-            program.b,
-            program.lb,
-            program.ub,
+            None if program.b is None else plain(program.b),
+            None if program.lb is None else plain(program.lb),
+            None if program.ub is None else plain(program.ub),
         )
         try:
             solution = qpsolvers.solve_problem(problem, solver=self._name, **self._settings)
@@ -62,4 +63,6 @@ class ColdSolver:
         return Answer(x, claimed, solution.y, solution.z, solution.z_box, core_ns)
 
     def _matrix(self, M: Any) -> Any:
-        return csc_matrix(M) if self._sparse and M is not None else M
+        if M is None:
+            return None
+        return csc_matrix(M) if self._sparse else plain(M)

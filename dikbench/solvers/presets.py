@@ -39,7 +39,7 @@ _SETTINGS: Final[Mapping[str, Callable[[float], Mapping[str, Any]]]] = MappingPr
             "max_iter": 10_000,
         },
         # An active-set method is exact but where it smooths a linear program (eta_prox).
-        "daqp": lambda eps: {"primal_tol": eps, "dual_tol": 1e-12, "eta_prox": eps / 10},
+        "daqp": lambda eps: {"primal_tol": eps, "dual_tol": 1e-12, "eta_prox": eps / 1000},
         "highs": lambda eps: {
             "primal_feasibility_tolerance": max(eps, FINEST),
             "dual_feasibility_tolerance": max(eps, FINEST),

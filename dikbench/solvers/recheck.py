@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from dikbench.array import Array, Indices
+from dikbench.array import Array, Indices, Mask
 from dikbench.modelled_program import ModelledProgram
 from dikbench.quadratic_program import QuadraticProgram
 from dikbench.solvers.answer import Answer
@@ -33,6 +33,7 @@ class Verdicts:
     Attributes:
         claimed: 1 if the solver said of every program that it solved it, 0 if not, -1 if there was
             none.
+        lied: whether the solver claimed an answer that is not within tolerance.
         verified: 1 if every answer is within tolerance, 0 if not, -1 if there was none.
         primal, dual, gap: the largest residuals of the step (see `Residuals`); NaN where one is
             not known.
@@ -40,11 +41,12 @@ class Verdicts:
             not known.
     """
 
-    __slots__ = ("claimed", "distance", "dual", "gap", "primal", "verified")
+    __slots__ = ("claimed", "distance", "dual", "gap", "lied", "primal", "verified")
 
     def __init__(self, steps: int) -> None:
         self.claimed: Indices = np.full(steps, NO_PROGRAM)
         self.verified: Indices = np.full(steps, NO_PROGRAM)
+        self.lied: Mask = np.zeros(steps, dtype=bool)
         self.primal: Array = np.zeros(steps)
         self.dual: Array = np.zeros(steps)
         self.gap: Array = np.zeros(steps)
@@ -67,6 +69,7 @@ class Verdicts:
         for step, given, answer in solved:
             if answer.x is None:
                 self.verified[step] = 0
+                self.lied[step] |= answer.claimed
                 continue
             program = given.matrices() if isinstance(given, ModelledProgram) else given
             groups.setdefault(structure(program, answer), []).append((step, program, answer))
@@ -86,3 +89,4 @@ class Verdicts:
         good = np.isfinite(stack.x).all(axis=1) & found.within(tolerance)
         good &= ~(distance > VERIFIED_DISTANCE)
         np.minimum.at(self.verified, steps, good.astype(int))
+        np.logical_or.at(self.lied, steps, ~good & [answer.claimed for answer in answers])

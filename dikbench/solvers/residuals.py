@@ -25,21 +25,26 @@ class Residuals:
         nearness: a bound on the distance from the optimum that follows from them to first order
             (see `optimum`): max |x - x*| [rad/s] where P is positive definite, the difference in
             cost elsewhere; infinite where nothing follows.
+        explained: whether there are multipliers, so that dual and gap are known.
     """
 
-    __slots__ = ("dual", "gap", "nearness", "primal")
+    __slots__ = ("dual", "explained", "gap", "nearness", "primal")
 
-    def __init__(self, primal: Array, dual: Array, gap: Array, nearness: Array) -> None:
+    def __init__(
+        self, primal: Array, dual: Array, gap: Array, nearness: Array, *, explained: bool
+    ) -> None:
+        self.explained = explained
         self.primal = primal
         self.dual = dual
         self.gap = gap
         self.nearness = nearness
 
     def within(self, tolerance: float) -> Mask:
-        """Whether every residual that is known is within a tolerance, (k,)."""
-        parts = (self.primal, self.dual, self.gap)
-        within: Mask = np.all([~(part > tolerance) for part in parts], axis=0)
-        return within
+        """Whether every residual that can be known is within a tolerance, (k,); NaN is not."""
+        good: Mask = self.primal <= tolerance
+        if self.explained:
+            good = good & (self.dual <= tolerance) & (self.gap <= tolerance)
+        return good
 
 
 def residuals(stack: Stack) -> Residuals:
@@ -50,7 +55,7 @@ def residuals(stack: Stack) -> Residuals:
     primal = _primal(stack)
     if not stack.explained:
         unknown = np.full(len(stack.x), np.nan)
-        return Residuals(primal, unknown, unknown, np.full(len(stack.x), np.inf))
+        return Residuals(primal, unknown, unknown, np.full(len(stack.x), np.inf), explained=False)
     Px = np.einsum("kij,kj->ki", stack.P, stack.x)
     gradient = Px + stack.q
     gap = _dots(stack.x, gradient)
@@ -74,7 +79,7 @@ def residuals(stack: Stack) -> Residuals:
     dual = np.maximum(np.abs(gradient).max(axis=1), wrong_sign)
     slack = np.abs(gap - _dots(stack.x, gradient)) + 2 * primal * pushing
     nearness = np.where(wrong_sign > 0, np.inf, _nearness(stack, gradient, slack))
-    return Residuals(primal, dual / scale, np.abs(gap) / scale, nearness)
+    return Residuals(primal, dual / scale, np.abs(gap) / scale, nearness, explained=True)
 
 
 def _one_sided(stack: Stack) -> list[tuple[Array, Array]]:

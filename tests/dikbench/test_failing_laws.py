@@ -24,7 +24,7 @@ from dikbench.quadratic_program import Program, QuadraticProgram
 from dikbench.references import joint_path, target_at_rest
 from dikbench.robot_catalogue import load_robot
 from dikbench.scenario import Scenario
-from dikbench.simulation import Run, simulate
+from dikbench.simulation import FAR_CHECK, Run, simulate
 from dikbench.solvers.answer import Answer
 from dikbench.solvers.catalogue import parse_solver
 from dikbench.solvers.checked import CheckedSolve, make_solve
@@ -150,6 +150,28 @@ def test_a_motion_without_bounds_is_ended() -> None:
     assert run.trace.steps == 0
 
 
+@pytest.mark.parametrize("jump", [1, FAR_CHECK - 1, FAR_CHECK, FAR_CHECK + 1])
+def test_a_target_that_runs_away_ends_a_run_at_the_next_look(jump: int) -> None:
+    """The task error is looked at in one step out of so many, and then ends the run."""
+    scenario = _scenario()
+    far = pin.SE3(np.eye(3), np.array([200.0, 0.0, 0.0]))
+    away = target_at_rest(far, 0.3)
+    near = scenario.reference.placement
+
+    def placement(tau: float) -> Any:
+        return (away.placement if tau > (jump - 0.5) * scenario.dt else near)(tau)
+
+    reference = replace(scenario.reference, placement=placement)
+    run = _run(lambda problem: np.zeros(3), replace(scenario, reference=reference))
+    step = FAR_CHECK if jump <= FAR_CHECK else 2 * FAR_CHECK
+    if step < 30:
+        assert run.status is Status.DIVERGED
+        assert run.message == f"step {step}: task error above 100 m, rad"
+        assert run.trace.steps == step
+    else:
+        assert run.status is Status.OK
+
+
 @pytest.mark.parametrize(
     ("error", "status"),
     [
@@ -200,7 +222,7 @@ class _Liar:
     def __init__(self) -> None:
         self.calls = 0
 
-    def __call__(self, program: QuadraticProgram) -> Answer:
+    def __call__(self, program: QuadraticProgram, site: int) -> Answer:
         assert program.lb is not None
         assert program.ub is not None
         self.calls += 1
@@ -217,6 +239,9 @@ def test_a_lying_solver_is_caught_and_its_answer_applied() -> None:
     assert run.trace.status[5] == STEP_CODE[Status.NOT_VERIFIED]
     assert run.trace.dual[5] == pytest.approx(0.5)
     assert np.delete(run.trace.dual, 5).max() < 1e-12
+    assert run.trace.claimed.tolist() == [1] * 30
+    assert np.flatnonzero(run.trace.verified != 1).tolist() == [5]
+    assert run.trace.verified[5] == 0
 
 
 @dataclass(frozen=True)

@@ -64,6 +64,8 @@ def _trace(speeds: list[float], wanted: list[list[float]], statuses: list[Status
         applied=applied,
         status=np.array([STEP_CODE[s] for s in statuses], dtype=int),
         relaxed=np.array([0, 2, 0, 1][:n], dtype=int),
+        claimed=np.array([1, 0, 1, -1][:n], dtype=int),
+        verified=np.array([1, 0, 0, -1][:n], dtype=int),
         primal=np.zeros(n),
         dual=np.zeros(n),
         gap=np.zeros(n),
@@ -116,6 +118,9 @@ def _rms(*values: float) -> float:
         ("infeasible_share", 1 / 4),
         ("solver_failed_share", 1 / 4),
         ("not_verified_share", 1 / 4),
+        ("claimed_share", 2 / 3),  # of the steps at which something was solved
+        ("verified_share", 1 / 3),
+        ("disagreed_share", 1 / 3),
         ("optimum_distance_max_rad_s", 0.25),
         ("stuck_share", 2 / 4),  # the reversal and the stop, whatever their status
         ("relaxed_share", 2 / 4),

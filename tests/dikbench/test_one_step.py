@@ -200,7 +200,10 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "solver that is not needed": ({"solver": "osqq"}, "did you mean 'osqp'.*valid:"),
     "setting": ({"formulation": "qp", "solver": "osqp[eps=1]"}, "'eps'.*valid: eps_abs"),
     "setting's type": ({"formulation": "qp", "solver": "osqp[max_iter=few]"}, "of type int"),
-    "interface": ({"formulation": "qp", "solver": "osqp[interface=hot]"}, "valid: cold, cvxpy"),
+    "interface": (
+        {"formulation": "qp", "solver": "osqp[interface=hot]"},
+        "valid: cold, cvxpy, warm",
+    ),
     "LP on a QP solver": ({"formulation": "lp-alpha", "solver": "proxqp"}, "linear program"),
     "cvxpy on daqp": ({"formulation": "lp-alpha-cvxpy", "solver": "daqp"}, "valid: osqp"),
     "reference frame": ({"reference_frame": "WORLDY"}, "did you mean 'WORLD'.*valid: LOCAL"),

@@ -25,6 +25,8 @@ import os, random, signal, sys, time
 from dataclasses import dataclass
 import numpy as np
 
+forked = []
+
 @dataclass(frozen=True)
 class Hostile:
     """Does what a law must not."""
@@ -61,10 +63,10 @@ class Hostile:
         if self.how == "print":
             print("x" * 10**7)
             os.write(2, b"y" * 10**7)
-        if self.how == "fork" and os.fork() == 0:
-            time.sleep(3600)
-        if self.how == "forked copy" and os.fork() == 0:
-            return np.zeros(problem.robot.nv)
+        if self.how in ("fork", "forked copy") and not forked:
+            forked.append(True)  # once: a copy that forks in every step would be a bomb
+            if os.fork() == 0 and self.how == "fork":
+                time.sleep(600)
         if self.how == "chdir":
             os.chdir("/")
         if self.how == "numpy state":
@@ -285,7 +287,5 @@ def test_a_harmless_oddity_of_a_law_changes_nothing(
         found = run_trials(planned, folder, RunSettings(jobs=1, trial_timeout=60.0))
         tables.append({p.trial.formulation: row for p, row in found})
     assert tables[0][f"{law}[how={how}]"]["status"] == "ok"
-    for row in (tables[0]["dls"], tables[1]["dls"]):
-        for key in UNEQUAL:
-            del row[key]
-    assert tables[0]["dls"] == tables[1]["dls"]
+    beside, alone = (pd.DataFrame([table["dls"]]).drop(columns=UNEQUAL) for table in tables)
+    pd.testing.assert_frame_equal(beside, alone, check_exact=True)

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import io
-import zipfile
+import pickle
+import time
 from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
 from dikbench.array import Array
 from dikbench.certificate import Certificate
-from dikbench.errors import Infeasible
+from dikbench.errors import DikbenchError, Infeasible
+from dikbench.motion import recompute
 from dikbench.plants import Plant, ideal, saturating
 from dikbench.problem import DikProblem, Formulation, Solve
 from dikbench.references import joint_path
@@ -24,6 +27,7 @@ from dikbench.scenario import Scenario
 from dikbench.simulation import LONGEST, Run, simulate
 from dikbench.solvers.catalogue import parse_solver
 from dikbench.solvers.checked import CheckedSolve, make_solve
+from dikbench.solvers.warm.warm_solver import WORKSPACES
 from dikbench.status import STEP_CODE, Status
 from dikbench.tasks import PostureTask
 from dikbench.trace import Trace
@@ -96,7 +100,18 @@ def test_a_time_indexed_run_lasts_as_long_as_its_scenario(
     assert run.trace.steps == steps
     assert run.trace.q.shape == (steps + 1, 3)
     assert run.trace.tau == pytest.approx(dt * np.arange(steps + 1))
-    for name in ("wanted", "commanded", "applied", "status", "relaxed", "primal", "dual", "gap"):
+    for name in (
+        "wanted",
+        "commanded",
+        "applied",
+        "status",
+        "relaxed",
+        "claimed",
+        "verified",
+        "primal",
+        "dual",
+        "gap",
+    ):
         assert len(getattr(run.trace, name)) == steps
 
 
@@ -255,7 +270,14 @@ def _same(a: Trace, b: Trace) -> None:
 
 
 @pytest.mark.parametrize(
-    ("law", "solver"), [("pinv[after=clip]", ""), ("qp", "daqp"), ("qp", "osqp")]
+    ("law", "solver"),
+    [
+        ("pinv[after=clip]", ""),
+        ("qp", "daqp"),
+        ("qp", "osqp"),
+        # ProxQP depends on where its memory is, in the last bit.
+        *(("qp", f"{name}[interface=warm]") for name in WORKSPACES if name != "proxqp"),
+    ],
 )
 @pytest.mark.parametrize("mode", ["time", "path"])
 def test_the_same_run_gives_the_same_bits(law: str, solver: str, mode: Any) -> None:
@@ -275,7 +297,7 @@ def test_the_same_run_gives_the_same_bits(law: str, solver: str, mode: Any) -> N
 def test_a_trace_comes_back_as_it_was_saved(tmp_path: Path) -> None:
     """Every array to the bit, with its type."""
     trace = _run(_at_step(7, lambda: _raise(Infeasible("x"))), _scenario(acceleration=5.0)).trace
-    path = tmp_path / "trace.npz"
+    path = tmp_path / "trace.arrow"
     trace.save(path)
     _same(Trace.load(path), trace)
     assert isinstance(Trace.load(path).dt, float)
@@ -286,8 +308,8 @@ def test_an_empty_trace_can_be_saved(tmp_path: Path) -> None:
     trace = _run(lambda problem: None).trace
     assert trace.steps == 0
     assert np.isnan(trace.share(Status.OK))
-    trace.save(tmp_path / "trace.npz")
-    _same(Trace.load(tmp_path / "trace.npz"), trace)
+    trace.save(tmp_path / "trace.arrow")
+    _same(Trace.load(tmp_path / "trace.arrow"), trace)
 
 
 class _Payload:
@@ -300,23 +322,135 @@ class _Payload:
         return (Path.touch, (self.path,))
 
 
-def test_no_pickle_is_read(tmp_path: Path) -> None:
-    """A trace from outside is data: an array of objects is refused before it is made."""
-    trace, proof = _run(_exact).trace, tmp_path / "proof"
-    path = tmp_path / "trace.npz"
-    trace.save(path)
-    hidden = io.BytesIO()
-    np.save(hidden, np.array([_Payload(proof)], dtype=object), allow_pickle=True)
-    with zipfile.ZipFile(path) as stored:
-        parts = {name: stored.read(name) for name in stored.namelist()}
-    assert "q.npy" in parts
-    with zipfile.ZipFile(path, "w") as forged:
-        for name, data in {**parts, "q.npy": hidden.getvalue()}.items():
-            forged.writestr(name, data)
-    with pytest.raises(ValueError, match="allow_pickle"):
-        Trace.load(path)
+def _pickled(proof: Path, kind: str) -> bytes:
+    """The payload in a file of some kind that can hold a pickle."""
+    stored = io.BytesIO()
+    if kind == "pickle":
+        pickle.dump(_Payload(proof), stored)
+    elif kind == "npy":
+        np.save(stored, np.array([_Payload(proof)], dtype=object), allow_pickle=True)
+    elif kind == "npz":
+        np.savez(stored, q=np.array([_Payload(proof)], dtype=object))
+    else:  # what made old versions of Arrow for Python run it
+        field = pa.field("q", pa.binary()).with_metadata(
+            {
+                "ARROW:extension:name": "arrow.py_extension_type",
+                "ARROW:extension:metadata": pickle.dumps(_Payload(proof)),
+            }
+        )
+        table = pa.table([pa.array([b"x"])], schema=pa.schema([field], {"dt": "0.01"}))
+        with pa.ipc.new_file(stored, table.schema) as file:
+            file.write_table(table)
+    return stored.getvalue()
+
+
+def _unpickle(data: bytes, kind: str) -> None:
+    """Run what is hidden in such a file."""
+    stored = io.BytesIO(data)
+    if kind == "pickle":
+        pickle.load(stored)
+    elif kind == "npy":
+        np.load(stored, allow_pickle=True)
+    elif kind == "npz":
+        np.load(stored, allow_pickle=True)["q"]
+    else:
+        pickle.loads(data[data.index(b"\x80\x04\x95") :])
+
+
+@pytest.mark.parametrize("kind", ["pickle", "npy", "npz", "arrow"])
+def test_no_pickle_is_read(tmp_path: Path, kind: str) -> None:
+    """A trace from outside is data: what holds a pickle is refused before it is run."""
+    proof, path = tmp_path / "proof", tmp_path / "trace.arrow"
+    path.write_bytes(_pickled(proof, kind))
+    _assert_refused(path)
     assert not proof.exists()
-    # The payload is a real one: numpy would run it if it were allowed to.
-    hidden.seek(0)
-    np.load(hidden, allow_pickle=True)
+    # The payload is a real one: it would be run by what unpickles it.
+    _unpickle(path.read_bytes(), kind)
     assert proof.exists()
+
+
+def _assert_refused(path: Path) -> None:
+    """As no trace, on one line that names the file."""
+    with pytest.raises(DikbenchError, match="not a trace of dikbench") as caught:
+        Trace.load(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_what_is_no_trace_is_refused(tmp_path: Path) -> None:
+    """No file, an empty one, a folder, text, half a trace."""
+    path = tmp_path / "trace.arrow"
+    _assert_refused(path)
+    _assert_refused(tmp_path)
+    for data in (b"", b"q\n1.0\n", b"ARROW1\0\0", bytes(1000)):
+        path.write_bytes(data)
+        _assert_refused(path)
+    _run(_exact).trace.save(path)
+    whole = path.read_bytes()
+    Trace.load(path)
+    path.write_bytes(whole[: len(whole) // 2])
+    _assert_refused(path)
+
+
+@pytest.mark.parametrize("missing", [field.name for field in fields(Trace)])
+def test_a_table_that_lacks_something_is_refused(tmp_path: Path, missing: str) -> None:
+    """An Arrow file without one of the columns, or without the period, is no trace."""
+    path = tmp_path / "trace.arrow"
+    _run(_exact).trace.save(path)
+    with pa.ipc.open_file(str(path)) as file:
+        table = file.read_all()
+    if missing == "dt":
+        table = table.replace_schema_metadata(None)
+    else:
+        table = table.drop_columns([missing])
+    with pa.ipc.new_file(str(path), table.schema) as new:
+        new.write_table(table)
+    _assert_refused(path)
+
+
+def test_a_table_of_words_is_refused(tmp_path: Path) -> None:
+    """Columns of the right names are not enough."""
+    names = [field.name for field in fields(Trace) if field.name != "dt"]
+    table = pa.table({name: ["a", "b"] for name in names}, metadata={"dt": "0.01"})
+    path = tmp_path / "trace.arrow"
+    with pa.ipc.new_file(str(path), table.schema) as file:
+        file.write_table(table)
+    _assert_refused(path)
+
+
+# --- what a run brings back beside its trace
+
+
+def test_a_run_brings_its_jacobians_and_its_times() -> None:
+    """One task Jacobian per step that was applied, at the configuration before it."""
+    law = _Law(_at_step(7, lambda: None))
+    for run in (_run(_exact), _run(law)):
+        motion = recompute(run.trace, _scenario())
+        assert run.jacobians.shape == (run.trace.steps, 3, 3)
+        assert np.array_equal(run.jacobians, motion.jacobians[:-1])
+        assert run.kinematics_ns > 0
+        assert run.law_ns > 0
+    assert run.trace.steps == 7
+    assert _run(lambda problem: None).jacobians.shape == (0, 3, 3)
+
+
+def test_the_law_takes_its_own_time() -> None:
+    """What a law sleeps is on its clock, not on that of the kinematics."""
+
+    def slow(problem: DikProblem) -> Array:
+        time.sleep(0.002)
+        return _exact(problem)
+
+    run = _run(slow)
+    assert run.law_ns > 30 * 2e6
+    assert run.kinematics_ns < 30 * 2e6
+
+
+def test_what_was_solved_is_in_the_trace() -> None:
+    """-1 where nothing was solved, else whether it was claimed and whether it is verified."""
+    assert np.all(_run(_exact).trace.claimed == -1)
+    assert np.all(_run(_exact).trace.verified == -1)
+    solve = make_solve(parse_solver("daqp"), "qp")
+    for _ in range(2):  # the second run does not see the first
+        trace = _run(make_formulation("qp"), solve=solve).trace
+        assert trace.claimed.tolist() == trace.verified.tolist() == [1] * 30

@@ -89,8 +89,11 @@ def test_our_own_settings_are_defaults_that_a_user_replaces() -> None:
         ("osqp[eps_abs=small]", r"solver osqp: eps_abs must be of type float, got 'small'"),
         ("osqp[max_iter=1.5]", r"solver osqp: max_iter must be of type int, got '1.5'"),
         ("osqp[polishing=maybe]", r"solver osqp: polishing must be of type bool, got 'maybe'"),
-        ("osqp[interface=wram]", r"interface of solver osqp 'wram'; valid: cold, cvxpy"),
-        ("daqp[interface=cvxpy]", r"interface of solver daqp 'cvxpy'; valid: cold"),
+        (
+            "osqp[interface=wram]",
+            r"interface of solver osqp 'wram'; did you mean 'warm'\? valid: cold, cvxpy, warm$",
+        ),
+        ("daqp[interface=cvxpy]", r"interface of solver daqp 'cvxpy'; valid: cold, warm$"),
         ("osqp[eps_abs]", "'eps_abs' is not parameter=value"),
         ("osqp[eps_abs=1,eps_abs=2]", "'eps_abs' is given twice"),
     ],

@@ -131,7 +131,7 @@ def test_every_solver_solves_a_known_quadratic_program(
     program, x = example()
     solve = _solve(call)
     assert solve(program) == pytest.approx(x, abs=ACCURACY)
-    assert solve.verified
+    assert solve.verdicts().verified.tolist() == [1]
 
 
 @pytest.mark.parametrize("example", [_linear, _scaling])
@@ -154,7 +154,7 @@ def test_a_program_in_modelling_words_gives_its_unknowns_stacked(name: str) -> N
     solve = _solve(name, "cvxpy")
     answer = solve(ModelledProgram(model, (v, alpha), lambda: program))
     assert answer == pytest.approx(x, abs=ACCURACY)
-    assert solve.verified
+    assert solve.verdicts().verified.tolist() == [1]
     assert solve.calls == 1
 
 
@@ -166,6 +166,15 @@ def test_the_program_is_not_changed_by_solving_it(call: str) -> None:
     _solve(call)(program)
     for part, value in before.items():
         assert np.array_equal(getattr(program, part), value), part
+
+
+@pytest.mark.parametrize("part", QuadraticProgram.__slots__)
+@pytest.mark.parametrize("call", CALLS)
+def test_a_program_may_be_read_only(call: str, part: str) -> None:
+    """Some arrays are shared between steps, and nobody can write to them."""
+    program, x = _mixture()
+    getattr(program, part).flags.writeable = False
+    assert _solve(call)(program) == pytest.approx(x, abs=ACCURACY)
 
 
 @pytest.mark.parametrize("call", CALLS)
@@ -197,8 +206,9 @@ def test_an_inconsistent_equality_is_never_verified(call: str) -> None:
         solve(_contradiction())
     except Infeasible:
         return
-    assert not solve.verified
-    assert solve.primal >= 0.5 - 1e-9  # no x is nearer to both
+    found = solve.verdicts()
+    assert found.verified.tolist() == [0]
+    assert found.primal[0] >= 0.5 - 1e-9  # no x is nearer to both
 
 
 LIMIT_OF_ITERATIONS = {
@@ -247,9 +257,10 @@ def test_the_exact_wrist_singularity_is_never_verified(call: str, direction: int
         solve(program)
     except Infeasible:
         return
-    assert not solve.verified
+    found = solve.verdicts()
+    assert found.verified.tolist() == [0]
     # No J v has the lost half of a unit twist: the largest of six rows misses its share.
-    assert solve.primal >= 0.5 / np.sqrt(6) - 1e-9
+    assert found.primal[0] >= 0.5 / np.sqrt(6) - 1e-9
 
 
 def test_the_judge_of_feasibility() -> None:

@@ -201,7 +201,7 @@ def test_feed_forward_keeps_the_error_of_a_moving_target(name: str, seed: int) -
     V_d[rows] = random.normal(size=len(rows))
     moved = target * pin.exp6(pin.Motion(h * V_d))
     task = PoseTask(gain=0.0)
-    here = task.linearize(_at(robot, q), target, V_d)
+    here = task.linearize(_at(robot, q), target, pin.Motion(V_d))
 
     def drift(V: Array) -> float:
         v = np.linalg.lstsq(here.J, V, rcond=None)[0]
@@ -217,9 +217,9 @@ def test_feed_forward_and_feedback_add_up() -> None:
     robot, random = load_robot("panda"), np.random.default_rng(6)
     at = _at(robot, robot.q0)
     target, V_d = _placement(robot, _random_q(robot, random, 0.3)), random.normal(size=6)
-    both = PoseTask(gain=3.0).linearize(at, target, V_d)
+    both = PoseTask(gain=3.0).linearize(at, target, pin.Motion(V_d))
     feedback = PoseTask(gain=3.0).linearize(at, target)
-    forward = PoseTask(gain=0.0).linearize(at, target, V_d)
+    forward = PoseTask(gain=0.0).linearize(at, target, pin.Motion(V_d))
     assert both.V == pytest.approx(feedback.V + forward.V)
     assert feedback.V == pytest.approx(3.0 * feedback.error)
     # The action matrix by hand: angular turned, linear turned plus lever times angular.
@@ -254,7 +254,8 @@ def test_a_planar_arm_keeps_three_rows() -> None:
     assert task.J == pytest.approx(np.array([[0.4, 0, 0], [0.5, 0.5, 0.2], [1, 1, 1]]))
     assert task.error == pytest.approx([0.2, 0, 0])
     assert task.V == pytest.approx([0.4, 0, 0])
-    turned = PoseTask().linearize(_at(robot, q), target, np.array([0, 0, 9.0, 9.0, 9.0, 0.5]))
+    twist = pin.Motion(np.array([0, 0, 9.0, 9.0, 9.0, 0.5]))
+    turned = PoseTask().linearize(_at(robot, q), target, twist)
     assert turned.V == pytest.approx([0.2, -0.2 * 0.5, 0.5])  # the lever of 0.2 m turns with it
     assert turned.log_derivative is not None
     assert turned.log_derivative.shape == (3, 3)

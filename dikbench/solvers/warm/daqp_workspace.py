@@ -9,7 +9,7 @@ from typing import Any, Final
 import daqp
 import numpy as np
 
-from dikbench.array import Array
+from dikbench.array import Array, plain
 from dikbench.quadratic_program import QuadraticProgram
 from dikbench.solvers.answer import Answer
 
@@ -35,15 +35,14 @@ class DaqpWorkspace:
         self._has_rows = len(self._rows) > 0
         self._model = daqp.Model()
         self._fill(program)
-        P, q = _writable(program.P), _writable(program.q)
+        P, q = plain(program.P), plain(program.q)
         self._model.setup(P, q, self._rows, self._upper, self._lower, sense)
         self._model.settings = dict(settings)
 
     def solve(self, program: QuadraticProgram) -> Answer:
         """See `Workspace`."""
-        model, P, q, upper, lower = self._model, program.P, program.q, program.ub, program.lb
-        if not (P.flags.writeable and q.flags.writeable):
-            P, q = _writable(P), _writable(q)
+        model, P, q = self._model, plain(program.P), plain(program.q)
+        upper, lower = program.ub, program.lb
         if self._has_rows:
             self._fill(program)
             flag = model.update(H=P, f=q, A=self._rows, bupper=self._upper, blower=self._lower)
@@ -67,21 +66,16 @@ class DaqpWorkspace:
         self._last_upper, self._last_lower = program.ub, program.lb
         i, j = self._bounds, self._first_equality
         if program.ub is not None:
-            self._upper[:i] = program.ub
+            np.minimum(program.ub, INFINITE, out=self._upper[:i])
         if program.lb is not None:
-            self._lower[:i] = program.lb
-        if program.G is not None:
-            self._upper[i:j] = program.h
+            np.maximum(program.lb, -INFINITE, out=self._lower[:i])
+        if program.G is not None and program.h is not None:
+            np.minimum(program.h, INFINITE, out=self._upper[i:j])
             self._rows[: j - i] = program.G
         if program.A is not None:
             self._upper[j:] = program.b
             self._lower[j:] = program.b
             self._rows[j - i :] = program.A
-
-
-def _writable(array: Array) -> Array:
-    """The array, or a copy of one that is read-only, which daqp does not take."""
-    return array if array.flags.writeable else array.copy()
 
 
 def _is_fixed(upper: Array | None, lower: Array | None) -> bool:

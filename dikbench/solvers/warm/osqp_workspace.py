@@ -10,6 +10,7 @@ import numpy as np
 import osqp
 from scipy.sparse import csc_matrix
 
+from dikbench.array import plain
 from dikbench.quadratic_program import QuadraticProgram
 from dikbench.solvers.answer import Answer
 
@@ -52,15 +53,17 @@ class OsqpWorkspace:
             self._upper[j:] = program.ub
         if program.lb is not None:
             self._lower[j:] = program.lb
-        P_values = program.P.ravel()[self._triangle]
+        if (self._lower > self._upper).any():  # OSQP would go on with the bounds before
+            return Answer(None, claimed=False)
+        P_values, q = program.P.ravel()[self._triangle], plain(program.q)
         if self._solver is None:
             self._set_up(program, P_values)
         elif j:
             self._solver.update(
-                q=program.q, l=self._lower, u=self._upper, Px=P_values, Ax=self._values.ravel()
+                q=q, l=self._lower, u=self._upper, Px=P_values, Ax=self._values.ravel()
             )
         else:
-            self._solver.update(q=program.q, l=self._lower, u=self._upper, Px=P_values)
+            self._solver.update(q=q, l=self._lower, u=self._upper, Px=P_values)
         start = perf_counter_ns()
         result = self._solver.solve(raise_error=False)
         core_ns = perf_counter_ns() - start

@@ -24,7 +24,8 @@ class ProxqpWorkspace:
         self._none = np.full(n, np.inf)
         self._below = np.full(self._inequalities, -np.inf)
         self._solver = proxqp.dense.QP(n, m, self._inequalities, self._bounded)
-        self._solver.settings.initial_guess = proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
+        # The first solve has nothing to start from; it takes zeros for an answer now and then.
+        self._solver.settings.initial_guess = proxqp.InitialGuess.EQUALITY_CONSTRAINED_INITIAL_GUESS
         for key, value in settings.items():
             setattr(self._solver.settings, key, value)
         self._is_set_up = False
@@ -32,12 +33,14 @@ class ProxqpWorkspace:
     def solve(self, program: QuadraticProgram) -> Answer:
         """See `Workspace`."""
         solver = self._solver
+        upper, lower = program.ub, program.lb
+        if upper is not None and lower is not None and (lower > upper).any():
+            return Answer(None, claimed=False)
         take = solver.update if self._is_set_up else solver.init
-        self._is_set_up = True
         below = self._below if program.G is not None else None
         if self._bounded:
-            lower = -self._none if program.lb is None else program.lb
-            upper = self._none if program.ub is None else program.ub
+            lower = -self._none if lower is None else lower
+            upper = self._none if upper is None else upper
             take(
                 program.P, program.q, program.A, program.b, program.G, below, program.h,
                 lower, upper,
@@ -47,6 +50,9 @@ class ProxqpWorkspace:
         start = perf_counter_ns()
         solver.solve()
         core_ns = perf_counter_ns() - start
+        if not self._is_set_up:
+            self._is_set_up = True
+            solver.settings.initial_guess = proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
         results = solver.results
         push = results.z.copy()
         return Answer(

@@ -25,6 +25,7 @@ Structure = tuple[int, int | None, int | None, bool, bool]
 """Number of unknowns, of equalities and inequalities, and which bounds there are not."""
 
 NOTHING: Final = None, None
+FAILED: Final = Answer(None, claimed=False)
 
 
 class WarmSolver:
@@ -53,14 +54,24 @@ class WarmSolver:
             program.lb is None,
             program.ub is None,
         )
-        try:
-            known, workspace = self._sites.get(site, NOTHING)
-            if workspace is None or known != structure:
-                workspace = self._make(program, self._settings)
-                self._sites[site] = structure, workspace
-            answer = workspace.solve(program)
-        except Exception:  # each library has its own
-            answer = Answer(None, claimed=False)
-        if not answer.claimed:  # what failed is no place to start from
+        known, workspace = self._sites.get(site, NOTHING)
+        answer = FAILED
+        if workspace is not None and known == structure:
+            answer = _solved(workspace, program)
+        if not answer.claimed:  # what failed is no place to start from: once more, from scratch
             self._sites.pop(site, None)
+            try:
+                workspace = self._make(program, self._settings)
+            except Exception:
+                return FAILED
+            answer = _solved(workspace, program)
+            if answer.claimed:
+                self._sites[site] = structure, workspace
         return answer
+
+
+def _solved(workspace: Workspace, program: QuadraticProgram) -> Answer:
+    try:
+        return workspace.solve(program)
+    except Exception:  # each library has its own
+        return FAILED
