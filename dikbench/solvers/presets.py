@@ -38,8 +38,14 @@ _SETTINGS: Final[Mapping[str, Callable[[float], Mapping[str, Any]]]] = MappingPr
             "eps_duality_gap_rel": 0.0,
             "max_iter": 10_000,
         },
-        # An active-set method is exact but where it smooths a linear program (eta_prox).
-        "daqp": lambda eps: {"primal_tol": eps, "dual_tol": 1e-12, "eta_prox": eps / 1000},
+        # Exact but where it smooths a linear program: more strongly (a negative weight is one where
+        # needed) and to a finer end than by default.
+        "daqp": lambda eps: {
+            "primal_tol": eps / 10,
+            "dual_tol": 1e-12,
+            "eps_prox": -1e-4,
+            "eta_prox": eps / 10,
+        },
         "highs": lambda eps: {
             "primal_feasibility_tolerance": max(eps, FINEST),
             "dual_feasibility_tolerance": max(eps, FINEST),

@@ -6,7 +6,6 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
 
@@ -15,7 +14,6 @@ from dikbench.report.page import write_report
 from dikbench.run.results import ResultsFolder
 from dikbench.run.runner import RunSettings, run_study, run_trials
 from dikbench.study import Selection, expand, load_study, select
-from dikbench.trace import Trace
 
 UNEQUAL = ["wall_time_s", "control_time_s", "described"]
 """What may differ between two runs of the same trials."""
@@ -86,7 +84,9 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     selection = Selection(
         scenarios=("reach", "near-miss[miss=0.02]"), references=("time", "path"), seeds=(0, 1)
     )
-    run_study(select(load_study("smoke"), selection, named=True), out, RunSettings(jobs=2), "a test")
+    run_study(
+        select(load_study("smoke"), selection, named=True), out, RunSettings(jobs=2), "a test"
+    )
     write_report(out)
     return out
 
@@ -265,7 +265,12 @@ def test_a_report_of_nothing_but_skipped_cells_is_made(tmp_path: Path) -> None:
     selection = Selection(
         formulations=("lp-alpha",), solvers=("proxqp",), scenarios=("reach",), plants=("ideal",)
     )
-    run_study(select(load_study("smoke"), selection, named=False), tmp_path / "out", RunSettings(1), "a test")
+    run_study(
+        select(load_study("smoke"), selection, named=False),
+        tmp_path / "out",
+        RunSettings(1),
+        "a test",
+    )
     write_report(tmp_path / "out")
     assert "1 cells skipped" in (tmp_path / "out" / "report.md").read_text()
 

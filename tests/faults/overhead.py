@@ -1,0 +1,59 @@
+"""What bookkeeping costs: thousands of short trials, wall time and the driver's memory.
+
+python tests/faults/overhead.py --trials 10000
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import tempfile
+import time
+from pathlib import Path
+
+import msgspec
+
+from dikbench.run.results import ResultsFolder
+from dikbench.run.runner import RunSettings, run_study
+from dikbench.study import Cells, Study, expand
+
+
+def study_of(trials: int) -> Study:
+    """A study of short trials (50 ticks), half `dls`, half `qp` with warm daqp."""
+    return Study(
+        description="short trials",
+        cells=(Cells(("dls",)), Cells(("qp",), ("daqp[interface=warm]",))),
+        scenarios=("reach[duration=0.5]",),
+        plants=("ideal",),
+        seeds=tuple(range(trials // 2)),
+        name="short",
+    )
+
+
+def main() -> None:
+    """Run 1000 trials, then all, and print what each cost."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--trials", type=int, default=10_000)
+    arguments = parser.parse_args()
+    for count in (1000, arguments.trials):
+        begun = time.perf_counter()
+        planned = expand(msgspec.structs.replace(study_of(count), scenarios=("reach",)))
+        expanding = time.perf_counter() - begun
+        with tempfile.TemporaryDirectory() as folder:
+            begun = time.perf_counter()
+            out = Path(folder) / "out"
+            run_study(study_of(count), out, RunSettings(jobs=2, traces="none"), "overhead")
+            wall = time.perf_counter() - begun
+            busy = float(ResultsFolder(out).read()[0]["wall_time_s"].sum())
+        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        print(
+            f"{len(planned)} trials: expanded in {expanding:.2f} s, run in {wall:.1f} s, of it "
+            f"{1e3 * busy / count:.2f} ms per trial in the trial; overhead "
+            f"{1e3 * (2 * wall - busy) / count:.2f} ms of worker time per trial; the driver's "
+            f"largest memory {memory:.0f} MB",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()
