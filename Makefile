@@ -10,6 +10,9 @@ setup:           ## environment with the tested versions
 test:            ## the tests
 	$(PYTHON) -m pytest
 
+test-long:       ## the tests that take minutes
+	$(PYTHON) -m pytest -m long
+
 lint:            ## style, format and types
 	$(PYTHON) -m ruff check . && $(PYTHON) -m ruff format --check . && $(PYTHON) -m mypy
 
@@ -28,4 +31,4 @@ benchmark:       ## how fast the harness is, against its peers (let nothing else
 constraints:     ## the installed versions become the tested ones
 	.venv/bin/pip freeze --exclude-editable --exclude pip --exclude setuptools > constraints.txt
 
-.PHONY: help setup test lint format contract quick benchmark constraints
+.PHONY: help setup test test-long lint format contract quick benchmark constraints

@@ -43,7 +43,7 @@ _SETTINGS: Final[Mapping[str, Callable[[float], Mapping[str, Any]]]] = MappingPr
         "daqp": lambda eps: {
             "primal_tol": eps / 10,
             "dual_tol": 1e-12,
-            "eps_prox": -1e-4,
+            "eps_prox": -1e-2,
             "eta_prox": eps / 10,
         },
         "highs": lambda eps: {
