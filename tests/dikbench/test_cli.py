@@ -1,8 +1,12 @@
 from __future__ import annotations
 
 import os
+import shutil
+import signal
+import sqlite3
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pandas as pd
@@ -169,3 +173,80 @@ def test_show_prints_one_thing_in_full(tmp_path: Path, name: str, expected: str)
     done = dikbench("show", name, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert expected in done.stdout
+
+
+SHORT = ("--formulation", "dls", "--scenario", "reach[duration=0.2]", "--plant", "ideal")
+
+
+def test_time_and_status_work_on_a_folder(tmp_path: Path) -> None:
+    """Times alone first, then the trials, then what is there."""
+    timed = dikbench("time", *SHORT, "--out", "out", cwd=tmp_path)
+    assert timed.returncode == 0, timed.stderr
+    assert "Timing of one call" in timed.stdout
+    assert list(pd.read_csv(tmp_path / "out" / "timing.csv")["formulation"]) == ["dls"]
+    missing = dikbench("status", "out", cwd=tmp_path)
+    assert missing.stdout.split() == ["1", "missing", "1", "planned"]
+    assert dikbench("run", *SHORT, "--out", "out", cwd=tmp_path).returncode == 0
+    assert dikbench("status", "out", cwd=tmp_path).stdout.split() == ["1", "ok", "1", "planned"]
+    again = dikbench("run", *SHORT, "--out", "out", cwd=tmp_path)
+    assert "1 of 1 trials are done" in again.stderr
+    nothing = dikbench("status", "nosuch", cwd=tmp_path)
+    assert nothing.returncode == 2
+    assert nothing.stderr.startswith("error: no results in")
+    assert not (tmp_path / "nosuch").exists()
+
+
+def test_ctrl_c_keeps_what_is_finished_and_says_how_to_go_on(tmp_path: Path) -> None:
+    """Exit code 130, the rows so far, and the command."""
+    arguments = ["run", *SHORT, "--out", "out", "--jobs", "1"]
+    for seed in range(400):
+        arguments += ["--seed", str(seed)]
+    process = subprocess.Popen(
+        [sys.executable, "-c", "from dikbench.cli import main; main()", *arguments],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        text=True,
+        cwd=tmp_path,
+    )
+    store = tmp_path / "out" / "results.sqlite"
+    for _ in range(600):
+        time.sleep(0.1)
+        if store.exists():
+            try:
+                with sqlite3.connect(store) as database:
+                    if database.execute("SELECT COUNT(*) FROM trials").fetchone()[0] >= 5:
+                        break
+            except sqlite3.OperationalError:
+                continue  # its tables are not there yet
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130, said
+    assert "of 400 trials are done and kept; to continue: dikbench run" in said
+    assert "Traceback" not in said
+    assert 5 <= len(pd.read_csv(tmp_path / "out" / "trials.csv")) < 400
+
+
+@pytest.mark.skipif(not Path("/dev/shm").is_dir() or os.geteuid() != 0, reason="needs a tmpfs")
+def test_a_full_disk_is_one_line_and_what_was_committed_is_kept(tmp_path: Path) -> None:
+    """On a file system of one megabyte."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(disk)]
+    if subprocess.run(mount, capture_output=True, check=False).returncode:
+        pytest.skip("mounting is not allowed here")
+    try:
+        arguments = ["run", *SHORT, "--scenario", "reach", "--out", str(disk / "out")]
+        for seed in range(30):
+            arguments += ["--seed", str(seed)]
+        done = dikbench(*arguments, cwd=tmp_path)
+        assert done.returncode == 2, done.stderr
+        last = done.stderr.splitlines()[-1]
+        assert last.startswith("error: ")
+        assert "space" in last or "full" in last
+        assert "Traceback" not in done.stderr
+        shutil.copytree(disk / "out", tmp_path / "copy")
+        with sqlite3.connect(tmp_path / "copy" / "results.sqlite") as database:
+            assert database.execute("PRAGMA integrity_check").fetchone() == ("ok",)
+            assert database.execute("SELECT COUNT(*) FROM trials").fetchone()[0] > 0
+    finally:
+        subprocess.run(["umount", str(disk)], check=True)

@@ -79,6 +79,6 @@ def test_warm_and_cold_agree_under_the_finest_preset(law: str, name: str, scenar
     print(f"{law} {name} {scenario}: {worst_velocity:.1e} {worst_cost:.1e}")
     tolerance = solver.tolerance
     assert worst_cost <= tolerance
-    # A gradient r of the cost is left over by J v = sigma r / (sigma^2 + lambda^2) <= r / (2 lambda)
-    # of task velocity, and alpha scaling has nothing that is so flat.
+    # A gradient r that is left over moves J v by sigma r / (sigma^2 + lambda^2) <= r / (2 lambda)
+    # each way; alpha scaling has nothing that is so flat.
     assert worst_velocity <= tolerance * (2 / (2 * DAMPING) if law == "qp" else 1)

@@ -21,6 +21,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from dikbench.run.columns import TIMES
 from dikbench.run.results import ResultsFolder
 
 ARGUMENTS = [
@@ -29,7 +30,7 @@ ARGUMENTS = [
     "--scenario", "reach[duration=1]", "--scenario", "near-miss[miss=0.05]",
     "--scenario", "speed-sweep[laps=2]",
 ]  # fmt: skip
-TIMELESS = ["wall_time_s", "control_time_s", "environment", "run"]
+TIMELESS = ["wall_time_s", "control_time_s", "environment", "run", *TIMES]
 
 
 def start(out: Path) -> subprocess.Popen[bytes]:
