@@ -14,6 +14,7 @@ from dikbench.registry import Plugin, formulation_plugin, make_scenario, plugins
 from dikbench.robot_catalogue import ROBOTS, load_robot
 from dikbench.selector import parse_selector
 from dikbench.solvers.catalogue import BACK_ENDS, is_installed
+from dikbench.solvers.presets import TOLERANCES
 from dikbench.study import load_study, shipped_studies
 
 
@@ -108,6 +109,7 @@ def _plugin(plugin: Plugin) -> str:
 
 def _solver(name: str) -> str:
     entry = BACK_ENDS[name]
+    presets = ", ".join(f"{preset} {tolerance:g}" for preset, tolerance in TOLERANCES.items())
     settings = ", ".join(f"{key} ({kind.__name__})" for key, kind in entry.settings.items())
     return "\n".join(
         [
@@ -115,6 +117,7 @@ def _solver(name: str) -> str:
             f"  package: {entry.distribution}, {'installed' if is_installed(name) else 'missing'}",
             f"  interfaces: {', '.join(entry.interfaces)} (the first is the default)",
             f"  linear programs: {entry.no_lp or 'yes'}",
+            f"  presets: {presets} (largest residual of a verified answer)",
             f"  settings: {settings or 'none'}",
         ]
     )

@@ -56,16 +56,13 @@ class Store:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        existed = path.is_file()
-        if existed and path.stat().st_size == 0:
-            raise DikbenchError(f"store {path}: the file is empty; remove it to start anew")
         with self._guarded():
             self._database = sqlite3.connect(path, isolation_level=None)
             self._database.execute("PRAGMA journal_mode = WAL")
             self._database.execute("PRAGMA synchronous = NORMAL")
-            if existed:
+            if self._database.execute("SELECT COUNT(*) FROM sqlite_master").fetchone()[0]:
                 self._check_schema()
-            else:
+            else:  # a new file, or one whose run was killed before it had tables
                 with self._transaction():
                     for statement in TABLES.split(";\n"):
                         self._database.execute(statement)

@@ -7,6 +7,7 @@ import pytest
 
 from dikbench.errors import DikbenchError
 from dikbench.listing import description
+from dikbench.solvers.catalogue import parse_solver
 from dikbench.study import Selection, Study, expand, load_study, select, shipped_studies
 
 MINIMAL = """
@@ -56,7 +57,9 @@ def test_quick_covers_laws_families_and_solvers() -> None:
     families = {trial.scenario.partition("[")[0] for trial in trials}
     assert laws == {"pinv", "dls", "nullspace", "qp", "lp-alpha", "lp-alpha-cvxpy"}
     assert families == {"reach", "near-miss", "joint-limit-crossing", "speed-sweep"}
-    assert len({trial.solver for trial in trials if trial.formulation == "qp"}) == 6
+    solvers = [parse_solver(trial.solver) for trial in trials if trial.formulation == "qp"]
+    assert len({solver.name for solver in solvers}) == 6
+    assert {solver.interface for solver in solvers} == {"cold", "warm"}
     assert {trial.plant for trial in trials} == {"ideal", "saturating"}
 
 

@@ -59,6 +59,18 @@ def table(out: Path) -> pd.DataFrame:
     return ResultsFolder(out).read()[0].drop(columns=TIMELESS)
 
 
+def counted(out: Path) -> tuple[int, int]:
+    """Number of rows, and of different trials, in a store that is as it should be."""
+    with sqlite3.connect(out / "results.sqlite") as database:
+        assert database.execute("PRAGMA integrity_check").fetchone() == ("ok",)
+        if not database.execute("SELECT COUNT(*) FROM sqlite_master").fetchone()[0]:
+            return 0, 0
+        found: tuple[int, int] = database.execute(
+            "SELECT COUNT(*), COUNT(DISTINCT id) FROM trials"
+        ).fetchone()
+    return found
+
+
 def main() -> None:
     """Run, kill, compare."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -88,11 +100,9 @@ def main() -> None:
                         pass
                 process.wait()
                 killed += 1
-            with sqlite3.connect(out / "results.sqlite") as database:
-                assert database.execute("PRAGMA integrity_check").fetchone() == ("ok",)
-                rows = database.execute(
-                    "SELECT COUNT(*), COUNT(DISTINCT id) FROM trials"
-                ).fetchone()
+            if not (out / "results.sqlite").exists():
+                continue
+            rows = counted(out)
             assert rows[0] == rows[1] <= len(expected)
             print(f"{killed} kills, {rows[0]} of {len(expected)} rows", flush=True)
             if rows[0] == len(expected):
