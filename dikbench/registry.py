@@ -14,7 +14,7 @@ import sys
 import typing
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, is_dataclass, replace
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Literal
@@ -59,7 +59,7 @@ class Plugin:
         _, _, text = (inspect.getdoc(self.documented) or "").partition("Source: ")
         return " ".join(text.partition("\n\n")[0].split()).rstrip(".")
 
-    @property
+    @cached_property
     def parameters(self) -> Mapping[str, inspect.Parameter]:
         """Its parameters, with their defaults."""
         law = _preset(self.build)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -82,11 +83,12 @@ class ResultsFolder:
         """
         trials = store.trials()
         try:
-            _replace(self.path / "trials.csv", trials.to_csv(index=False).encode())
-            _replace(self.path / "timing.csv", store.times().to_csv(index=False).encode())
-            _replace(self.path / "trials.parquet", trials.to_parquet(index=False))
+            times = store.times()
             text = json.dumps(store.manifest(), indent=2, ensure_ascii=False) + "\n"
-            _replace(self.path / "manifest.json", text.encode())
+            _replace(self.path / "trials.csv", lambda file: trials.to_csv(file, index=False))
+            _replace(self.path / "timing.csv", lambda file: times.to_csv(file, index=False))
+            _replace(self.path / "trials.parquet", lambda file: trials.to_parquet(file, index=False))
+            _replace(self.path / "manifest.json", lambda file: file.write_text(text))
         except OSError as error:
             reason = error.strerror or str(error)
             raise DikbenchError(
@@ -103,8 +105,8 @@ class ResultsFolder:
             return store.trials(), store.manifest()
 
 
-def _replace(path: Path, content: bytes) -> None:
+def _replace(path: Path, write: Callable[[Path], object]) -> None:
     """Write a file in one move."""
     partial = path.with_name(path.name + ".partial")
-    partial.write_bytes(content)
+    write(partial)
     partial.replace(path)

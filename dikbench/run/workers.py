@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import os
 import random
@@ -89,6 +90,8 @@ def _prepare(memory: int | None) -> None:
 
     os._exit = leave_loudly  # type: ignore[assignment]
     CALM.update(folder=os.getcwd(), errors=np.geterr(), process=own, leave=leave)
+    gc.collect()
+    gc.freeze()  # what is imported stays: the collector need not look at it after every few trials
     if memory is not None and sys.platform != "win32":
         limit = _address_space() + memory * 2**20
         resource.setrlimit(resource.RLIMIT_AS, (limit, limit))

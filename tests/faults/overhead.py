@@ -11,21 +11,25 @@ import tempfile
 import time
 from pathlib import Path
 
-import msgspec
-
 from dikbench.run.results import ResultsFolder
 from dikbench.run.runner import RunSettings, run_study
 from dikbench.study import Cells, Study, expand
 
 
 def study_of(trials: int) -> Study:
-    """A study of short trials (50 ticks), half `dls`, half `qp` with warm daqp."""
+    """Short trials (50 ticks), half `dls`, half `qp` with warm daqp, all of one scenario."""
+    dampings = [f"{1e-5 * (number + 1):.5f}" for number in range(trials // 2)]
     return Study(
         description="short trials",
-        cells=(Cells(("dls",)), Cells(("qp",), ("daqp[interface=warm]",))),
+        cells=(
+            Cells(tuple(f"dls[damping={damping}]" for damping in dampings)),
+            Cells(
+                tuple(f"qp[damping={damping}]" for damping in dampings),
+                ("daqp[interface=warm]",),
+            ),
+        ),
         scenarios=("reach[duration=0.5]",),
         plants=("ideal",),
-        seeds=tuple(range(trials // 2)),
         name="short",
     )
 
@@ -37,7 +41,7 @@ def main() -> None:
     arguments = parser.parse_args()
     for count in (1000, arguments.trials):
         begun = time.perf_counter()
-        planned = expand(msgspec.structs.replace(study_of(count), scenarios=("reach",)))
+        planned = expand(study_of(count))
         expanding = time.perf_counter() - begun
         with tempfile.TemporaryDirectory() as folder:
             begun = time.perf_counter()
