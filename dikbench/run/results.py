@@ -87,7 +87,9 @@ class ResultsFolder:
             text = json.dumps(store.manifest(), indent=2, ensure_ascii=False) + "\n"
             _replace(self.path / "trials.csv", lambda file: trials.to_csv(file, index=False))
             _replace(self.path / "timing.csv", lambda file: times.to_csv(file, index=False))
-            _replace(self.path / "trials.parquet", lambda file: trials.to_parquet(file, index=False))
+            _replace(
+                self.path / "trials.parquet", lambda file: trials.to_parquet(file, index=False)
+            )
             _replace(self.path / "manifest.json", lambda file: file.write_text(text))
         except OSError as error:
             reason = error.strerror or str(error)
