@@ -174,7 +174,8 @@ def simulate(
                 raise TrialEnded(Status.DIVERGED, f"commanded speed above {FASTEST:g} rad/s")
             v.flags.writeable = False  # it is recorded as it is
             applied = plant(v, limits, dt)
-            applied.flags.writeable = False
+            if applied is not v:
+                applied.flags.writeable = False
             if outcome.status is not ok:
                 record.status[k] = STEP_CODE[outcome.status]
             if problem.relaxed:
