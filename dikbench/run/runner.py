@@ -14,7 +14,7 @@ from typing import Any, Final
 import msgspec
 from pebble import ProcessExpired
 
-from dikbench.errors import DikbenchError
+from dikbench.errors import DikbenchError, unknown
 from dikbench.identity import cell_id
 from dikbench.run.columns import CELL
 from dikbench.run.progress_display import ProgressDisplay
@@ -75,6 +75,7 @@ def run_study(study: Study, out: Path, settings: RunSettings, command: str) -> R
         Interrupted: if the user stops the run; what is finished is kept.
     """
     planned = expand(study)
+    _check_rerun(settings.rerun, planned)
     folder = ResultsFolder(out)
     with folder.lock(), Store(folder.database) as store:
         commit = git_commit()
@@ -126,15 +127,23 @@ def time_study(study: Study, out: Path, command: str) -> ResultsFolder:
     return folder
 
 
+def _check_rerun(rerun: str, planned: Sequence[PlannedTrial]) -> None:
+    names = {text for p in planned for text in _names(p.trial)}
+    if rerun not in {"", "failed", "all", *names}:
+        raise unknown("what to rerun", rerun, ["failed", "all", *sorted(names)])
+
+
+def _names(trial: Trial) -> set[str]:
+    """What a trial can be called by: selectors, and names without parameters."""
+    selectors = (trial.formulation, trial.scenario, trial.solver)
+    return {*selectors, *(parse_selector(selector).name for selector in selectors)}
+
+
 def _again(planned: PlannedTrial, status: str, rerun: str) -> bool:
     """Whether a finished trial is to be run again."""
     if rerun == "failed":
         return status not in {Status.OK.value, Status.SKIPPED.value}
-    trial = planned.trial
-    selectors = (trial.formulation, trial.scenario, trial.solver)
-    return rerun == "all" or any(
-        rerun in {selector, parse_selector(selector).name} for selector in selectors
-    )
+    return rerun == "all" or rerun in _names(planned.trial)
 
 
 def _run_trials(
@@ -180,7 +189,7 @@ def run_trials(
     )
     processes: set[int] = set()
     try:
-        with workers(settings.jobs, settings.trial_memory) as pool:
+        with workers(settings.jobs, (work.__module__,), settings.trial_memory) as pool:
             running: dict[Future[Any], PlannedTrial] = {}
             while True:
                 for p in islice(waiting, AHEAD * settings.jobs - len(running)):
@@ -237,7 +246,10 @@ def _time(
     if not scenarios:
         return
     arguments = (cells, timing.reference, timing.problems, timing.rounds)
-    with workers(1) as pool, ProgressDisplay(len(scenarios), "timed scenarios") as display:
+    with (
+        workers(1, (time_scenario.__module__,)) as pool,
+        ProgressDisplay(len(scenarios), "timed scenarios") as display,
+    ):
         futures = {
             scenario: pool.schedule(
                 time_scenario, args=(scenario, study.seeds[0], *arguments), timeout=TIMING_TIMEOUT

@@ -16,7 +16,7 @@ from dikbench.plants import PLANTS
 from dikbench.problem import program_of
 from dikbench.registry import make_formulation, make_scenario
 from dikbench.run.provenance import environment
-from dikbench.run.workers import calm_down
+from dikbench.run.worker_process import calm_down
 from dikbench.scenario import Scenario
 from dikbench.simulation import ReferenceMode, simulate
 from dikbench.solvers.catalogue import parse_solver

@@ -144,6 +144,13 @@ def test_rerun_chooses_what_is_run_again(tmp_path: Path, rerun: str, again: int)
     assert int((runs == 2).sum()) == again
 
 
+def test_rerun_of_what_is_not_there_is_one_line(tmp_path: Path) -> None:
+    """With the nearest match, before anything runs."""
+    with pytest.raises(DikbenchError, match=r"rerun 'dsl'.*dls"):
+        run_study(STUDY, tmp_path / "out", RunSettings(jobs=1, rerun="dsl"), "a test")
+    assert not (tmp_path / "out").exists()
+
+
 def test_status_counts_done_failed_and_missing(undisturbed: Path, tmp_path: Path) -> None:
     """By status, and what the last study still lacks."""
     assert status_of(undisturbed) == {"ok": 6}
