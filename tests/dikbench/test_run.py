@@ -41,7 +41,7 @@ class Hostile:
         if self.how == "sys.exit":
             sys.exit(0)
         if self.how == "memory":
-            hoard = [np.ones(2**22) for _ in range(4000)]
+            hoard = [np.empty(2**24) for _ in range(4000)]
         while self.how == "spin":
             pass
         if self.how == "sleep":
