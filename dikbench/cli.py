@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import shlex
+import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -183,6 +184,7 @@ def run(
     selected = _selected(study, axes)
     folder = out or Path("runs") / selected.name
     command = shlex.join(["dikbench", *sys.argv[1:]])
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a stop like Ctrl-C
     settings = RunSettings(jobs or available_cores(), trial_timeout, trial_memory, traces, rerun)
     try:
         run_study(selected, folder, settings, command)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import os
 import random
+import signal
 import sys
 from importlib import import_module
 from typing import Any, Final
@@ -18,16 +20,24 @@ EXITED: Final = 70
 """Exit code of a worker in which a plug-in called `os._exit(0)`: an exit code of 0 would be an
 orderly end to the pool, which would wait for the answer."""
 
+PARENT_DEATH_SIGNAL: Final = 1
+"""PR_SET_PDEATHSIG of Linux' prctl."""
+
 CALM: dict[str, Any] = {}
 """State of a worker process as it was before any trial: what a plug-in may have changed of it is
 put back."""
 
 
 def prepare(imports: tuple[str, ...], memory: int | None) -> None:
-    """Make a new process a worker: imports done, out of the terminal's reach, memory limited."""
-    import numpy as np
+    """Make a new process a worker: imports done, out of the terminal's reach, memory limited.
 
-    import_module("dikbench.run.worker")  # before the limit: what is imported is not the trial's
+    Args:
+        imports: modules that are loaded before the limit: their memory is not the trial's.
+        memory: what the process may take beyond that [MB], where the system can limit it.
+    """
+    _die_with_the_driver()
+    for module in imports:
+        import_module(module)
     if hasattr(os, "setpgid"):
         os.setpgid(0, 0)  # what a plug-in forks can be found and ended, and Ctrl-C is the driver's
     _silence()
@@ -56,6 +66,12 @@ def calm_down() -> None:
     np.seterr(**CALM["errors"])
     np.random.seed(0)  # noqa: NPY002 - a plug-in may draw from it, and every trial starts alike
     random.seed(0)
+
+
+def _die_with_the_driver() -> None:
+    """A law that loops for ever must not outlive a driver that was killed (Linux)."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(PARENT_DEATH_SIGNAL, signal.SIGKILL)
 
 
 def _silence() -> None:

@@ -250,3 +250,49 @@ def test_a_full_disk_is_one_line_and_what_was_committed_is_kept(tmp_path: Path) 
             assert database.execute("SELECT COUNT(*) FROM trials").fetchone()[0] > 0
     finally:
         subprocess.run(["umount", str(disk)], check=True)
+
+
+SPINNING = """
+from dataclasses import dataclass
+
+@dataclass(frozen=True)
+class Spin:
+    def velocity(self, problem, solve):
+        while True:
+            pass
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such signal")
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_no_worker_outlives_its_driver(tmp_path: Path, how: signal.Signals) -> None:
+    """However the driver ends, a law that loops for ever ends with it."""
+    (tmp_path / "spin.py").write_text(SPINNING)
+    arguments = ["run", "--formulation", "spin.py:Spin", *SHORT[2:], "--out", "out", "--jobs", "1"]
+    process = subprocess.Popen(
+        [sys.executable, "-c", "from dikbench.cli import main; main()", *arguments],
+        stderr=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        cwd=tmp_path,
+    )
+    time.sleep(8)
+    assert len(_processes_in(tmp_path)) >= 2
+    process.send_signal(how)
+    process.wait(timeout=30)
+    for _ in range(100):
+        if not _processes_in(tmp_path):
+            break
+        time.sleep(0.1)
+    assert not _processes_in(tmp_path)
+
+
+def _processes_in(folder: Path) -> list[str]:
+    """The processes whose working folder this is."""
+    found = []
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            if os.readlink(process / "cwd") == str(folder):
+                found.append(process.name)
+        except OSError:  # gone, or not ours
+            continue
+    return found
