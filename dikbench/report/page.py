@@ -99,7 +99,7 @@ def remarks(trials: pd.DataFrame) -> list[str]:
     if trials["law_time_median_us"].notna().any():
         found.append(
             "Times are of one run on one machine: compare ratios. Solvers are called cold, through "
-            "qpsolvers, where their selector does not say interface=warm."
+            "qpsolvers, where their selector names no other interface."
         )
         cells = trials.drop_duplicates([*LAW, "scenario"])["timing_verdict"].dropna()
         unstable = int((cells != STABLE).sum())
@@ -129,12 +129,14 @@ def remarks(trials: pd.DataFrame) -> list[str]:
     )
     skipped = trials[trials["status"] == "skipped"]
     for formulation, solver, message, number in _counted(skipped, [*LAW, "message"]):
-        found.append(f"{formulation} with {solver}: {number} cells skipped: {message}.")
+        found.append(f"{formulation} with {solver}: {_several(number, 'cell')} skipped: {message}.")
     failed = trials[~trials["status"].isin(["ok", "skipped"])]
     for formulation, solver, status, message, number in _counted(
         failed, [*LAW, "status", "message"]
     ):
-        found.append(f"{formulation} with {solver}: {number} trials {status}: {message}.")
+        found.append(
+            f"{formulation} with {solver}: {_several(number, 'trial')} {status}: {message}."
+        )
     for column, words in (
         ("not_verified_share", "claimed success that the recheck denies"),
         ("solver_failed_share", "gave no answer to a feasible program"),
@@ -148,6 +150,10 @@ def remarks(trials: pd.DataFrame) -> list[str]:
                     f"{formulation} with {solver} {words} in up to {percent} of a run's steps."
                 )
     return found
+
+
+def _several(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 def _counted(rows: pd.DataFrame, columns: list[str]) -> list[tuple[Any, ...]]:

@@ -29,8 +29,13 @@ from dikbench.status import Status
 from dikbench.study import PlannedTrial, Study, expand
 from dikbench.trial import Trial
 
-TIMING_TIMEOUT: Final = 1800.0
+TIMING_TIMEOUT: Final = 900.0
 """Wall-clock limit of the timing of one scenario [s]."""
+
+FATAL: Final = frozenset(
+    status.value for status in (Status.TIMEOUT, Status.CRASHED, Status.OUT_OF_MEMORY)
+)
+"""Ends of a trial after which its law is not timed."""
 
 AHEAD: Final = 8
 """Trials per worker that are handed over ahead: no worker waits, and memory does not grow."""
@@ -230,10 +235,16 @@ def _time(
     store: Store, run: int, study: Study, planned: Sequence[PlannedTrial], *, again: bool
 ) -> None:
     """The timing pass, in one process of its own when no trial runs."""
+    done, timing = store.statuses(), study.timing
+    # A law that took its process with it in a trial would do so again, and the others' times too.
+    fatal = {(p.trial.formulation, p.trial.solver) for p in planned if done.get(p.id) in FATAL}
     cells: list[Cell] = list(
-        dict.fromkeys((p.trial.formulation, p.trial.solver) for p in planned if not p.skip)
+        dict.fromkeys(
+            cell
+            for p in planned
+            if not p.skip and (cell := (p.trial.formulation, p.trial.solver)) not in fatal
+        )
     )
-    timing = study.timing
     if not cells or timing is None:
         return
     known: set[str] = set() if again else store.timed()

@@ -58,6 +58,7 @@ class Store:
         self.path = path
         with self._guarded():
             self._database = sqlite3.connect(path, isolation_level=None)
+            self._check_format()
             self._database.execute("PRAGMA journal_mode = WAL")
             self._database.execute("PRAGMA synchronous = NORMAL")
             if self._database.execute("SELECT COUNT(*) FROM sqlite_master").fetchone()[0]:
@@ -210,6 +211,14 @@ class Store:
             raise DikbenchError(
                 f"store {self.path}: {reason}; what was committed before is kept"
             ) from error
+
+    def _check_format(self) -> None:
+        try:
+            self._database.execute("PRAGMA schema_version").fetchone()
+        except sqlite3.DatabaseError as error:
+            raise DikbenchError(
+                f"store {self.path}: not a store of dikbench ({error}); move it away to start anew"
+            ) from None
 
     def _check_schema(self) -> None:
         try:

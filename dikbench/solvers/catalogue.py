@@ -185,6 +185,8 @@ def why_not(solver: Solver, program: Program) -> str:
     """Why this solver cannot take this kind of program; empty where it can."""
     back_end = BACK_ENDS[solver.name]
     if program == "cvxpy":
+        if solver.interface == "warm":
+            return f"{solver.name}[interface=warm] takes matrices, and the law is written in cvxpy"
         if "cvxpy" in back_end.interfaces:
             return ""
         valid = ", ".join(n for n, b in BACK_ENDS.items() if "cvxpy" in b.interfaces)

@@ -272,7 +272,7 @@ def test_a_report_of_nothing_but_skipped_cells_is_made(tmp_path: Path) -> None:
         "a test",
     )
     write_report(tmp_path / "out")
-    assert "1 cells skipped" in (tmp_path / "out" / "report.md").read_text()
+    assert "1 cell skipped" in (tmp_path / "out" / "report.md").read_text()
 
 
 @pytest.mark.parametrize("how", ["print", "fork", "forked copy", "chdir", "numpy state"])
@@ -294,3 +294,18 @@ def test_a_harmless_oddity_of_a_law_changes_nothing(
     assert tables[0][f"{law}[how={how}]"]["status"] == "ok"
     beside, alone = (pd.DataFrame([table["dls"]]).drop(columns=UNEQUAL) for table in tables)
     pd.testing.assert_frame_equal(beside, alone, check_exact=True)
+
+
+def test_a_law_that_hangs_is_not_timed_and_the_others_are(
+    tmp_path: Path, write: Callable[[Path], str]
+) -> None:
+    """The run ends with its report: the timing pass has no limit for a single call."""
+    law = write(tmp_path)
+    selection = Selection(
+        formulations=(f"{law}[how=spin]", "dls"), scenarios=("reach[duration=0.2]",)
+    )
+    study = select(load_study("smoke"), selection, named=False)
+    run_study(study, tmp_path / "out", RunSettings(jobs=2, trial_timeout=4.0), "a test")
+    write_report(tmp_path / "out")
+    assert set(pd.read_csv(tmp_path / "out" / "timing.csv")["formulation"]) == {"dls"}
+    assert "2 trials timeout: not finished after 4 s" in (tmp_path / "out/report.md").read_text()

@@ -148,6 +148,7 @@ def test_which_solver_can_take_which_program() -> None:
     assert why_not(parse_solver("proxqp"), "qp") == ""
     assert why_not(parse_solver("proxqp"), "lp").startswith("proxqp cannot take a linear program")
     assert why_not(parse_solver("clarabel"), "cvxpy") == ""
+    assert "takes matrices" in why_not(parse_solver("clarabel[interface=warm]"), "cvxpy")
     reason = why_not(parse_solver("daqp"), "cvxpy")
     assert reason == "daqp is not called through cvxpy here; valid: osqp, clarabel, highs, scs"
 
