@@ -26,6 +26,7 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import Final, Literal, get_args
 
+import msgspec
 import numpy as np
 
 from dikbench.array import Array
@@ -48,7 +49,7 @@ HAIR: Final = 1e-9
 """Share of a distance, and distance [rad], by which rounding cannot bring a limit nearer."""
 
 
-class Box:
+class Box(msgspec.Struct, eq=False):
     """Bounds on the velocity of one control step.
 
     Attributes:
@@ -57,12 +58,9 @@ class Box:
         relaxed: number of joints whose acceleration bound had to be given up.
     """
 
-    __slots__ = ("lower", "relaxed", "upper")
-
-    def __init__(self, lower: Array, upper: Array, relaxed: int) -> None:
-        self.lower = lower
-        self.upper = upper
-        self.relaxed = relaxed
+    lower: Array
+    upper: Array
+    relaxed: int
 
 
 def velocity_box(

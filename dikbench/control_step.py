@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from time import perf_counter_ns
 
+import msgspec
 import numpy as np
 
 from dikbench.array import Array
@@ -25,7 +26,7 @@ class TrialEnded(Exception):
         self.status = status
 
 
-class Outcome:
+class Outcome(msgspec.Struct, eq=False):
     """What came of one control step.
 
     Attributes:
@@ -36,13 +37,10 @@ class Outcome:
         square: v^T v.
     """
 
-    __slots__ = ("law_ns", "square", "status", "velocity")
-
-    def __init__(self, velocity: Array, status: Status, law_ns: int, square: float) -> None:
-        self.velocity = velocity
-        self.status = status
-        self.law_ns = law_ns
-        self.square = square
+    velocity: Array
+    status: Status
+    law_ns: int
+    square: float
 
 
 def control_step(

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from dikbench.array import Array, Indices
@@ -136,7 +137,7 @@ class JointLimits:
         return bool(np.array_equal(self.q_index, np.arange(self.nv)))
 
 
-class Limits:
+class Limits(msgspec.Struct, eq=False):
     """What the robot may do here: the limits of its joints as seen from one configuration.
 
     Attributes:
@@ -145,11 +146,8 @@ class Limits:
             None where position limits are not in force.
     """
 
-    __slots__ = ("coordinates", "joint")
-
-    def __init__(self, joint: JointLimits, coordinates: Array | None) -> None:
-        self.joint = joint
-        self.coordinates = coordinates
+    joint: JointLimits
+    coordinates: Array | None
 
     @property
     def to_lower(self) -> Array | None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Literal, Protocol, runtime_checkable
 
+import msgspec
+
 from dikbench.array import Array
 from dikbench.box import Box, Braking, velocity_box
 from dikbench.limits import Limits
@@ -15,7 +17,7 @@ from dikbench.tasks.task import LinearizedTask, stacked
 LimitKind = Literal["position", "velocity", "acceleration"]
 
 
-class DikProblem:
+class DikProblem(msgspec.Struct, eq=False):
     """One control step: where the robot is, what is wanted of it, what it may do.
 
     Attributes:
@@ -28,24 +30,13 @@ class DikProblem:
         relaxed: joints whose acceleration bound `box` had to give up (a record, see `box`).
     """
 
-    __slots__ = ("dt", "limits", "q", "relaxed", "robot", "tasks", "v_prev")
-
-    def __init__(
-        self,
-        robot: Robot,
-        q: Array,
-        v_prev: Array | None,
-        dt: float,
-        tasks: list[LinearizedTask],
-        limits: Limits,
-    ) -> None:
-        self.robot = robot
-        self.q = q
-        self.v_prev = v_prev
-        self.dt = dt
-        self.tasks = tasks
-        self.limits = limits
-        self.relaxed = 0
+    robot: Robot
+    q: Array
+    v_prev: Array | None
+    dt: float
+    tasks: list[LinearizedTask]
+    limits: Limits
+    relaxed: int = 0
 
     @property
     def primary(self) -> LinearizedTask:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Literal
 
+import msgspec
+
 from dikbench.array import Array
 
 Program = Literal["qp", "lp", "cvxpy"]
@@ -11,7 +13,7 @@ Program = Literal["qp", "lp", "cvxpy"]
 one written in cvxpy's modelling words."""
 
 
-class QuadraticProgram:
+class QuadraticProgram(msgspec.Struct, eq=False):
     """The program in x.
 
         min 1/2 x^T P x + q^T x   s.t.   G x <= h,   A x = b,   lb <= x <= ub
@@ -26,24 +28,11 @@ class QuadraticProgram:
         lb, ub: (n,) each, possibly infinite, or None.
     """
 
-    __slots__ = ("A", "G", "P", "b", "h", "lb", "q", "ub")
-
-    def __init__(
-        self,
-        P: Array,
-        q: Array,
-        G: Array | None = None,
-        h: Array | None = None,
-        A: Array | None = None,
-        b: Array | None = None,
-        lb: Array | None = None,
-        ub: Array | None = None,
-    ) -> None:
-        self.P = P
-        self.q = q
-        self.G = G
-        self.h = h
-        self.A = A
-        self.b = b
-        self.lb = lb
-        self.ub = ub
+    P: Array
+    q: Array
+    G: Array | None = None
+    h: Array | None = None
+    A: Array | None = None
+    b: Array | None = None
+    lb: Array | None = None
+    ub: Array | None = None

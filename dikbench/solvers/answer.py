@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import msgspec
+
 from dikbench.array import Array
 
 
-class Answer:
+class Answer(msgspec.Struct, eq=False):
     """A solver's answer to one program.
 
     Attributes:
@@ -16,20 +18,9 @@ class Answer:
         core_ns: time inside the solver library, without its Python wrapper [ns].
     """
 
-    __slots__ = ("claimed", "core_ns", "x", "y", "z", "z_box")
-
-    def __init__(
-        self,
-        x: Array | None,
-        claimed: bool,
-        y: Array | None = None,
-        z: Array | None = None,
-        z_box: Array | None = None,
-        core_ns: int = 0,
-    ) -> None:
-        self.x = x
-        self.claimed = claimed
-        self.y = y
-        self.z = z
-        self.z_box = z_box
-        self.core_ns = core_ns
+    x: Array | None
+    claimed: bool
+    y: Array | None = None
+    z: Array | None = None
+    z_box: Array | None = None
+    core_ns: int = 0

@@ -70,7 +70,7 @@ class PoseTask:
         )
 
 
-class LinearizedPose(LinearizedTask):
+class LinearizedPose(LinearizedTask, eq=False):
     """A pose task at one configuration.
 
     Attributes:
@@ -78,25 +78,8 @@ class LinearizedPose(LinearizedTask):
         rows: the rows of the twist that are kept; None: all six.
     """
 
-    __slots__ = ("relative", "rows")
-
-    def __init__(
-        self,
-        J: Array,
-        V: Array,
-        error: Array,
-        weight: float | Array,
-        priority: int,
-        relative: Any,
-        rows: Any,
-    ) -> None:
-        self.J = J  # all here, without a call of super: this is made in every control step
-        self.V = V
-        self.error = error
-        self.weight = weight
-        self.priority = priority
-        self.relative = relative
-        self.rows = rows
+    relative: Any = None
+    rows: Any = None
 
     @property
     def log_derivative(self) -> Array | None:

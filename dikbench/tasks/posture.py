@@ -53,10 +53,8 @@ class PostureTask:
         )
 
 
-class LinearizedPosture(LinearizedTask):
+class LinearizedPosture(LinearizedTask, eq=False):
     """A posture task at one configuration: J is the identity (shared: not to be written to)."""
-
-    __slots__ = ()
 
     def normal_equations(self, *, log_derivative: bool = False) -> tuple[Array, Array]:
         """W and W V (see `LinearizedTask`): nothing to multiply."""

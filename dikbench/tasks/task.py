@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
+import msgspec
 import numpy as np
 import scipy.linalg
 
@@ -11,7 +13,7 @@ from dikbench.array import Array
 from dikbench.kinematics import Kinematics
 
 
-class LinearizedTask:
+class LinearizedTask(msgspec.Struct, eq=False):
     """A task at one configuration: J v = V.
 
     Attributes:
@@ -23,16 +25,11 @@ class LinearizedTask:
         priority: 1 is the most important.
     """
 
-    __slots__ = ("J", "V", "error", "priority", "weight")
-
-    def __init__(
-        self, J: Array, V: Array, error: Array, weight: float | Array = 1.0, priority: int = 1
-    ) -> None:
-        self.J = J
-        self.V = V
-        self.error = error
-        self.weight = weight
-        self.priority = priority
+    J: Array
+    V: Array
+    error: Array
+    weight: float | Array = 1.0
+    priority: int = 1
 
     @property
     def log_derivative(self) -> Array | None:
@@ -76,20 +73,18 @@ def stacked(tasks: list[LinearizedTask]) -> LinearizedTask:
     """Several tasks of one priority as one task, rows below each other."""
     if len(tasks) == 1:
         return tasks[0]
-    stack = _StackedTask(
+    return _StackedTask(
         np.vstack([t.J for t in tasks]),
         np.concatenate([t.V for t in tasks]),
         np.concatenate([t.error for t in tasks]),
         np.concatenate([np.broadcast_to(t.weight, t.V.shape) for t in tasks]),
         tasks[0].priority,
+        tasks,
     )
-    stack.parts = tasks
-    return stack
 
 
-class _StackedTask(LinearizedTask):
-    __slots__ = ("parts",)
-    parts: list[LinearizedTask]
+class _StackedTask(LinearizedTask, eq=False):
+    parts: Sequence[LinearizedTask] = ()
 
     @property
     def log_derivative(self) -> Array | None:
