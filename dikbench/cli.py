@@ -63,7 +63,7 @@ STUDY_OPTIONS = (
         "formulations",
         multiple=True,
         metavar="SELECTOR",
-        help="A law, or path/to/file.py:Class; repeat for more.",
+        help="A law, path/to/file.py:Class, or oracle; 'dls[damping=0.01|0.1]' is two.",
     ),
     click.option(
         "--scenario",
@@ -91,8 +91,8 @@ STUDY_OPTIONS = (
         "--plant",
         "plants",
         multiple=True,
-        type=click.Choice(["ideal", "saturating"]),
-        help="What becomes of a command; repeat for both.",
+        metavar="SELECTOR",
+        help="ideal or saturating, with noise and delay: 'ideal[noise=1e-4,delay=2]'; repeat.",
     ),
     click.option(
         "--reference",

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os.path
 from dataclasses import fields, is_dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from dikbench.oracle import ORACLE
 from dikbench.registry import (
     Plugin,
     formulation_plugin,
     make_formulation,
+    make_plant,
     scenario_parameters,
     scenario_plugin,
 )
@@ -32,16 +35,20 @@ def trial_id(trial: Trial) -> str:
         DikbenchError: if a selector does not name anything valid.
     """
     cell = cell_id(trial.formulation, trial.solver, trial.scenario)
-    return _digest(json.dumps((cell, trial.plant, trial.reference, trial.seed)))
+    plant = make_plant(trial.plant)
+    how = (plant.drive.__name__, plant.noise, plant.delay, trial.reference, trial.seed)
+    return _digest(json.dumps((cell, *how)))
 
 
 def cell_id(formulation: str, solver: str, scenario: str) -> str:
     """The id of a cell that is timed: what `trial_id` is made of, but for how a trial is run."""
-    return _digest(json.dumps((_formulation(formulation), _solver(solver), _scenario(scenario))))
+    return _digest(json.dumps((_formulation(formulation), _solver(solver), scenario_id(scenario))))
 
 
 @lru_cache(maxsize=4096)
 def _formulation(text: str) -> str:
+    if text == ORACLE:
+        return text
     law = make_formulation(text)
     plugin = formulation_plugin(parse_selector(text).name)
     names: list[str] = [field.name for field in fields(law)] if is_dataclass(law) else []
@@ -50,9 +57,10 @@ def _formulation(text: str) -> str:
 
 
 @lru_cache(maxsize=65536)
-def _scenario(text: str) -> str:
+def scenario_id(text: str) -> str:
+    """The id of a scenario: its family, parameters and the version of its source, not its seed."""
     name = parse_selector(text).name
-    values = {key: repr(value) for key, value in scenario_parameters(text).items()}
+    values = {key: _described(value) for key, value in scenario_parameters(text).items()}
     return _digest(json.dumps([name, values, _source(scenario_plugin(name))], sort_keys=True))
 
 
@@ -65,6 +73,13 @@ def _solver(text: str) -> str:
     return _digest(
         json.dumps([solver.name, solver.interface, settings, solver.tolerance], sort_keys=True)
     )
+
+
+def _described(value: Any) -> str:
+    """A parameter's value; of a file that it names, the contents as well."""
+    if isinstance(value, str) and os.path.isfile(value):
+        return f"{value!r} {_digest_of_file(value)}"
+    return repr(value)
 
 
 def _source(plugin: Plugin) -> str:

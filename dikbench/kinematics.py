@@ -41,7 +41,7 @@ class Kinematics:
     def jacobian(self, frame: int) -> Array:
         """Body Jacobian of a frame, (6, nv), rows (linear; angular) in the frame's own axes."""
         J: Array = pin.getFrameJacobian(self._model, self._data, frame, LOCAL)
-        return J
+        return J if J.ndim == 2 else J[:, None]  # of a single joint Pinocchio makes a vector
 
 
 def smallest_singular_value(J: Array) -> float:

@@ -55,7 +55,7 @@ def _largest(values: Array) -> float:
 
 
 def _weights(motion: Motion) -> Array:
-    return row_weights(motion.scenario.robot.task_rows)
+    return row_weights(motion.scenario.rows)
 
 
 def _off_course(motion: Motion) -> float:

@@ -28,8 +28,10 @@ class Motion:
     Attributes:
         trace: the trace.
         scenario: the case that it is a trace of.
-        position_error: distance of the task frame from its target, (n + 1,) [m].
-        orientation_error: angle between them, (n + 1,) [rad].
+        position_error: distance of the task frame from its target, (n + 1,) [m]; NaN where the
+            task is about the orientation only.
+        orientation_error: angle between them, (n + 1,) [rad]; NaN where the task is about the
+            position only.
         jacobians: task Jacobians (m, rad), (n + 1, m, nv).
     """
 
@@ -98,7 +100,7 @@ def recompute(trace: Trace, scenario: Scenario, jacobians: Array | None = None) 
     """
     robot, frame = scenario.robot, scenario.robot.frame_id
     model, data, n = robot.model, robot.model.createData(), trace.steps
-    rows = np.array(robot.task_rows)
+    rows = np.array(scenario.rows)
     placements = []
     for q in trace.q:
         pin.forwardKinematics(model, data, q)
@@ -115,8 +117,16 @@ def recompute(trace: Trace, scenario: Scenario, jacobians: Array | None = None) 
     return Motion(
         trace=trace,
         scenario=scenario,
-        position_error=np.linalg.norm(X[:, :3, 3] - wanted_translations, axis=1),
-        orientation_error=rotation_angles(X[:, :3, :3], wanted_rotations),
+        position_error=(
+            np.linalg.norm(X[:, :3, 3] - wanted_translations, axis=1)
+            if rows[0] < 3
+            else np.full(n + 1, np.nan)
+        ),
+        orientation_error=(
+            rotation_angles(X[:, :3, :3], wanted_rotations)
+            if rows[-1] >= 3
+            else np.full(n + 1, np.nan)
+        ),
         jacobians=J,
     )
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -14,29 +14,77 @@ from dikbench.errors import DikbenchError
 from dikbench.kinematics import Kinematics, smallest_singular_value
 from dikbench.references import Reference
 from dikbench.robot import Robot
-from dikbench.steps import steps_in
+from dikbench.tasks import PoseTask, TrackingTask
+
+ORACLE = "oracle"
+"""What stands in the place of the law where the joint motion itself is scored."""
+
+POSE = PoseTask()
 
 
-def solve_placement(robot: Robot, target: Any, seed: Array, *, iterations: int = 200) -> Array:
-    """A configuration whose task frame is at `target`, by damped Gauss-Newton from `seed`.
+@dataclass(frozen=True, eq=False)
+class OracleMotion:
+    """A joint motion sampled along a reference, and what it asks of the robot.
+
+    Attributes:
+        instants: nominal times of the samples, (k + 1,) [s].
+        q: configurations, (k + 1, nq).
+        v: velocities between them at nominal speed, (k, nv) [rad/s].
+        sigma_min: smallest singular value of the task Jacobian (m, rad), (k + 1,).
+        speed_ratio: largest |v| over its limit, (k,).
+        margin: smallest distance to a position limit [rad], negative outside, (k + 1,).
+        reach: distance of the task frame from the first joint [m], (k + 1,).
+        exact: the configuration at any nominal time, where it is known in closed form.
+    """
+
+    instants: Array
+    q: Array
+    v: Array
+    sigma_min: Array
+    speed_ratio: Array
+    margin: Array
+    reach: Array
+    exact: Callable[[float], Array] | None = None
+
+    @property
+    def peak_speed_ratio(self) -> float:
+        """Largest joint speed over its limit."""
+        return float(self.speed_ratio.max(initial=0.0))
+
+
+def solve_placement(
+    robot: Robot,
+    target: Any,
+    seed: Array,
+    *,
+    tracking: TrackingTask = POSE,
+    iterations: int = 200,
+) -> Array:
+    """A configuration that does a tracking task, by damped Gauss-Newton from `seed`.
 
     Steps are Levenberg-Marquardt with damping by the squared error (Sugihara 2011), at most 0.3 rad
     each; position limits are not looked at.
+
+    Args:
+        robot: the robot.
+        target: where the task frame is to be (`pinocchio.SE3`).
+        seed: configuration to start from, (nq,).
+        tracking: the task; default: the whole pose.
+        iterations: largest number of steps.
 
     Raises:
         DikbenchError: if the residual (m, rad) does not fall below 1e-9.
     """
     kinematics = Kinematics(robot)
-    rows = np.array(robot.task_rows)
     q = seed
     error = np.inf
     for _ in range(iterations):
         kinematics.update(q)
-        e = pin.log6(kinematics.placement(robot.frame_id).actInv(target)).np[rows]
+        task = tracking.linearize(kinematics, target)
+        e, J = task.error, task.J
         before, error = error, float(np.linalg.norm(e))
         if error < 1e-12 or (error < 1e-9 and error >= before):
             return q  # there, or as near as rounding lets it come
-        J = kinematics.jacobian(robot.frame_id)[rows]
         H = J.T @ J
         H.flat[:: len(H) + 1] += 0.1 * error**2 + 1e-12
         step = np.linalg.solve(H, J.T @ e)
@@ -47,64 +95,73 @@ def solve_placement(robot: Robot, target: Any, seed: Array, *, iterations: int =
     )
 
 
-@dataclass(frozen=True, eq=False)
-class OracleMotion:
-    """A joint motion sampled along a reference, and what it asks of the robot.
+def follow(
+    robot: Robot, reference: Reference, q0: Array, instants: Array, tracking: TrackingTask = POSE
+) -> Array:
+    """Configurations (k + 1, nq) that follow a reference exactly from q0 on.
 
-    Attributes:
-        q: configurations, (k + 1, nq).
-        v: velocities between them at nominal speed, (k, nv) [rad/s].
-        sigma_min: smallest singular value of the task Jacobian (m, rad), (k + 1,).
-        speed_ratio: largest |v| over its limit, (k,).
-        margin: smallest distance to a position limit [rad], negative outside, (k + 1,).
-    """
-
-    q: Array
-    v: Array
-    sigma_min: Array
-    speed_ratio: Array
-    margin: Array
-
-
-def oracle_motion(
-    robot: Robot, reference: Reference, q0: Array, dt: float, seeds: Array | None = None
-) -> OracleMotion:
-    """Follow a reference exactly from q0, sample by sample.
+    Each is solved from the one before it, in the least-norm way where the arm has a null space.
 
     Args:
         robot: the robot.
         reference: the path.
-        q0: configuration at its beginning, (nq,).
-        dt: sampling period in nominal time [s].
-        seeds: a known joint motion, (k + 1, nq), to be taken as it is; default: each sample is
-            solved from the one before.
+        q0: configuration at the first instant, (nq,).
+        instants: nominal times, (k + 1,) [s].
+        tracking: what is to be followed.
 
     Raises:
         DikbenchError: if a sample cannot be reached.
     """
-    count = steps_in(reference.duration, dt)
     q = [q0]
-    for k in range(1, count + 1):
-        if seeds is not None:
-            q.append(seeds[k])
-        else:
-            q.append(solve_placement(robot, reference.placement(k * dt), q[-1]))
-    return measure_motion(robot, np.array(q), dt)
+    for tau in instants[1:]:
+        q.append(solve_placement(robot, reference.placement(tau), q[-1], tracking=tracking))
+    return np.array(q)
 
 
-def measure_motion(robot: Robot, q: Array, dt: float) -> OracleMotion:
-    """Measure a joint motion (k + 1, nq) that is sampled every dt [s]."""
-    model, rows = robot.model, np.array(robot.task_rows)
-    v = np.array([pin.difference(model, a, b) / dt for a, b in pairwise(q)])
+def oracle_motion(
+    robot: Robot, reference: Reference, q0: Array, instants: Array, tracking: TrackingTask = POSE
+) -> OracleMotion:
+    """Follow a reference exactly from q0 and measure the motion (see `follow`)."""
+    q = follow(robot, reference, q0, instants, tracking)
+    return measure_motion(robot, instants, q, tracking)
+
+
+def joint_oracle(
+    robot: Robot,
+    configuration: Callable[[float], Array],
+    instants: Array,
+    tracking: TrackingTask = POSE,
+) -> OracleMotion:
+    """Measure a joint motion that is known in closed form: tau [s] -> q (nq,)."""
+    q = np.array([configuration(tau) for tau in instants])
+    return measure_motion(robot, instants, q, tracking, configuration)
+
+
+def measure_motion(
+    robot: Robot,
+    instants: Array,
+    q: Array,
+    tracking: TrackingTask = POSE,
+    exact: Callable[[float], Array] | None = None,
+) -> OracleMotion:
+    """Measure a joint motion (k + 1, nq) at its instants (k + 1,) [s] (see `OracleMotion`)."""
+    model, rows = robot.model, np.array(tracking.rows(robot))
+    periods = np.diff(instants)
+    v = np.array(
+        [pin.difference(model, q[k], q[k + 1]) / period for k, period in enumerate(periods)]
+    ).reshape(len(periods), robot.nv)
     kinematics = Kinematics(robot)
-    sigma, margin = [], []
+    sigma, margin, reach = [], [], []
     for sample in q:
         kinematics.update(sample)
         sigma.append(smallest_singular_value(kinematics.jacobian(robot.frame_id)[rows]))
         margin.append(position_margin(robot, sample))
+        reach.append(robot.reach_of(kinematics.placement(robot.frame_id)))
     limit = robot.limits.velocity
     ratio = np.zeros(len(v)) if limit is None else limit.usage(v).max(axis=1)
-    return OracleMotion(q, v, np.array(sigma), ratio, np.array(margin))
+    return OracleMotion(
+        instants, q, v, np.array(sigma), ratio, np.array(margin), np.array(reach), exact
+    )
 
 
 def position_margin(robot: Robot, q: Array) -> float:

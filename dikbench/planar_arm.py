@@ -9,14 +9,17 @@ import pinocchio as pin
 
 
 def planar_arm(
-    lengths: tuple[float, ...], *, velocity_limit: float, position_limit: float = 2.8
+    lengths: tuple[float, ...],
+    *,
+    velocity_limits: tuple[float, ...],
+    position_limit: tuple[float, float] = (-2.8, 2.8),
 ) -> Any:
     """Build a chain of revolute joints about z, with links along x.
 
     Args:
         lengths: length of each link [m].
-        velocity_limit: of every joint [rad/s].
-        position_limit: of every joint, to both sides [rad].
+        velocity_limits: of each joint [rad/s].
+        position_limit: lower and upper, of every joint [rad].
 
     Returns:
         A Pinocchio model with the frame `tip` at the end of the last link. Every link weighs
@@ -25,16 +28,17 @@ def planar_arm(
     model = pin.Model()
     model.name = f"planar{len(lengths)}r"
     parent, placement = 0, pin.SE3.Identity()
-    for number, length in enumerate(lengths, start=1):
+    lower, upper = position_limit
+    for number, (length, speed) in enumerate(zip(lengths, velocity_limits, strict=True), start=1):
         parent = model.addJoint(
             parent,
             pin.JointModelRZ(),
             placement,
             f"joint{number}",
             np.array([100.0]),
-            np.array([velocity_limit]),
-            np.array([-position_limit]),
-            np.array([position_limit]),
+            np.array([speed]),
+            np.array([lower]),
+            np.array([upper]),
         )
         model.appendBodyToJoint(
             parent,

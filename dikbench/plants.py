@@ -1,18 +1,23 @@
-"""Plants: what a robot makes of a commanded velocity."""
+"""Plants: what a robot makes of a commanded velocity, and what a law gets to see of it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 
 from dikbench.array import Array
+from dikbench.errors import DikbenchError
 from dikbench.limits import Limits
 
-Plant = Callable[[Array, Limits, float], Array]
+Drive = Callable[[Array, Limits, float], Array]
 """(commanded v (nv,), limits at q, dt [s]) -> applied v (nv,)."""
+
+LONGEST_DELAY: Final = 1000
+"""Control steps; beyond that there is no loop to close."""
 
 
 def ideal(v: Array, limits: Limits, dt: float) -> Array:
@@ -31,7 +36,33 @@ def saturating(v: Array, limits: Limits, dt: float) -> Array:
     return v
 
 
-PLANTS: Final[Mapping[str, Plant]] = MappingProxyType({"ideal": ideal, "saturating": saturating})
+DRIVES: Final[Mapping[str, Drive]] = MappingProxyType({"ideal": ideal, "saturating": saturating})
+
+
+@dataclass(frozen=True)
+class Plant:
+    """A drive behind a measurement and a line of communication.
+
+    Attributes:
+        drive: what becomes of a command that arrives.
+        noise: standard deviation of the configuration that the law sees about the true one, per
+            joint and step [rad or m]; white and normal, drawn from the trial's seed.
+        delay: control steps by which a command arrives late; until the first one does, the robot
+            keeps the velocity that it has at the start.
+    """
+
+    drive: Drive = ideal
+    noise: float = 0.0
+    delay: int = 0
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        if not 0 <= self.noise < np.inf:
+            raise DikbenchError(f"plant: noise={self.noise} must be finite and at least 0 [rad]")
+        if not 0 <= self.delay <= LONGEST_DELAY:
+            raise DikbenchError(f"plant: delay={self.delay} must be 0 to {LONGEST_DELAY} steps")
+
+
 REFERENCE_MODES: Final = MappingProxyType(
     {
         "time": "the reference moves on with the clock",

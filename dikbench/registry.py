@@ -22,11 +22,12 @@ from typing import Any, Literal
 import msgspec
 
 from dikbench.errors import DikbenchError, unknown
+from dikbench.plants import DRIVES, Plant
 from dikbench.problem import Formulation
 from dikbench.scenario import Scenario
 from dikbench.selector import Selector, parse_selector
 
-Kind = Literal["formulation", "scenario"]
+Kind = Literal["formulation", "scenario", "plant"]
 
 
 @dataclass(frozen=True)
@@ -173,6 +174,20 @@ def make_scenario(text: str, seed: int = 0) -> Scenario:
         )
     scenario.certificate.check(text)
     return scenario
+
+
+def make_plant(text: str) -> Plant:
+    """Build a plant from `ideal[noise=...,delay=...]` or `saturating[...]`.
+
+    Raises:
+        DikbenchError: on an unknown name or parameter, or a value out of range.
+    """
+    selector = parse_selector(text)
+    if selector.name not in DRIVES:
+        raise unknown("plant", selector.name, DRIVES)
+    build = partial(Plant, DRIVES[selector.name])
+    plant: Plant = _build("plant", Plugin(selector.name, build, __file__), selector, {})
+    return plant
 
 
 def scenario_parameters(text: str) -> Mapping[str, Any]:

@@ -65,6 +65,11 @@ class Robot:
         """Number of velocities."""
         return int(self.model.nv)
 
+    def reach_of(self, placement: Any) -> float:
+        """Distance [m] of a placement (`pinocchio.SE3`) from the origin of the first joint."""
+        first = self.model.jointPlacements[1].translation
+        return float(np.linalg.norm(placement.translation - first))
+
     def with_limits(
         self,
         *,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import os.path
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -17,11 +16,21 @@ import pinocchio as pin
 
 from dikbench.array import Array
 from dikbench.captured_stderr import captured_stderr
+from dikbench.denavit_hartenberg import denavit_hartenberg_arm
 from dikbench.errors import DikbenchError, unknown
+from dikbench.omnidirectional_base import omnidirectional_base
 from dikbench.planar_arm import planar_arm
 from dikbench.robot import Robot, checked_vector, frame_id, model_limits
+from dikbench.robot_data import from_data, joints
 
 UR_START = (0.3, -1.2, 1.4, -1.7, -1.4, 0.2)
+NOT_PUBLISHED = "no data sheet or manual gives any"
+IN_CODE_ONLY = "chosen for this robot, which exists in code only"
+LWR_TABLE = tuple(
+    (0.0, turn * pi / 2, d)
+    for turn, d in zip((1, -1, -1, 1, 1, -1, 0), (0.3105, 0, 0.40, 0, 0.39, 0, 0.078), strict=True)
+)
+"""a [m], alpha [rad], d [m]; lengths as in Flacco, De Luca & Khatib 2015."""
 UR_BRAKING = (
     "joint speed limit over 0.5 s, the braking ramp that the safety system enforces "
     "(UR10/CB3 user manual, safety inputs)"
@@ -36,7 +45,7 @@ class CatalogueEntry:
         summary: one line for `dikbench list robots`.
         model: builds the Pinocchio model.
         frame: the default task frame.
-        start: a safe start, away from limits and singularities [rad].
+        start: a safe start, away from limits and singularities, (nv,): joint by joint [rad].
         acceleration: acceleration limits, (nv,) [rad/s^2] (no model file carries any), or None.
         acceleration_source: where they come from.
         task_rows: see `Robot`.
@@ -51,47 +60,30 @@ class CatalogueEntry:
     task_rows: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
 
 
-def _data_folder() -> Path:
-    try:
-        distribution = importlib.metadata.distribution("example-robot-data")
-    except importlib.metadata.PackageNotFoundError:
-        raise DikbenchError(
-            "example-robot-data is not installed: pip install example-robot-data"
-        ) from None
-    for file in distribution.files or ():
-        if file.parts[-4:-2] == ("robots", "panda_description"):
-            return Path(str(file.locate())).parents[2]
-    raise DikbenchError("example-robot-data is installed but holds no robots/panda_description")
-
-
-def _from_data(path: str, locked: tuple[str, ...] = ()) -> Callable[[], Any]:
-    def build() -> Any:
-        model = pin.buildModelFromUrdf(str(_data_folder() / path))
-        if not locked:
-            return model
-        return pin.buildReducedModel(
-            model, [model.getJointId(name) for name in locked], pin.neutral(model)
-        )
-
-    return build
-
-
 ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
     {
         "panda": CatalogueEntry(
             summary="Franka Emika Panda, 7 joints, fingers locked",
-            model=_from_data(
+            model=from_data(
                 "panda_description/urdf/panda.urdf",
-                locked=("panda_finger_joint1", "panda_finger_joint2"),
+                moving=joints("panda_joint{}", 1, 7),
             ),
             frame="panda_hand_tcp",
             start=(0, -pi / 4, 0, -3 * pi / 4, 0, pi / 2, pi / 4),
             acceleration=(15, 7.5, 10, 12.5, 15, 20, 20),
             acceleration_source="Franka Control Interface, joint limits of the Panda",
         ),
+        "ur3": CatalogueEntry(
+            summary="Universal Robots UR3, 6 joints, the UR5's small sister",
+            model=from_data("ur_description/urdf/ur3_robot.urdf"),
+            frame="tool0",
+            start=UR_START,
+            acceleration=(4.32, 4.32, 6.3, 6.4, 6.4, 6.4),
+            acceleration_source=UR_BRAKING,
+        ),
         "ur5": CatalogueEntry(
             summary="Universal Robots UR5, 6 joints, spherical-like wrist",
-            model=_from_data("ur_description/urdf/ur5_robot.urdf"),
+            model=from_data("ur_description/urdf/ur5_robot.urdf"),
             frame="tool0",
             start=UR_START,
             acceleration=(6.3, 6.3, 6.3, 6.4, 6.4, 6.4),
@@ -99,7 +91,7 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
         ),
         "ur10": CatalogueEntry(
             summary="Universal Robots UR10, 6 joints, the UR5's longer sister",
-            model=_from_data("ur_description/urdf/ur10_robot.urdf"),
+            model=from_data("ur_description/urdf/ur10_robot.urdf"),
             frame="tool0",
             start=UR_START,
             acceleration=(4.32, 4.32, 6.3, 6.4, 6.4, 6.4),
@@ -107,19 +99,87 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
         ),
         "xarm7": CatalogueEntry(
             summary="UFACTORY xArm7, 7 joints; its zero posture is singular",
-            model=_from_data("xarm_description/urdf/xarm7.urdf"),
+            model=from_data("xarm_description/urdf/xarm7.urdf"),
             frame="link_eef",
             start=(0, -0.5, 0, 1.0, 0, 1.3, 0),
             acceleration=(20,) * 7,
             acceleration_source="UFACTORY xArm SDK, joint acceleration at most 20 rad/s^2",
         ),
+        "kinova": CatalogueEntry(
+            summary="Kinova Jaco 2 (j2s6s200), 6 joints, three of them continuous",
+            model=from_data("kinova_description/robots/kinova.urdf"),
+            frame="j2s6s200_end_effector",
+            start=(0, 2.9, 1.3, -2.07, 1.4, 0),
+            acceleration=None,
+            acceleration_source=NOT_PUBLISHED,
+        ),
+        "tiago": CatalogueEntry(
+            summary="the arm of PAL Robotics' TIAGo, 7 joints, torso, head and wheels locked",
+            model=from_data(
+                "tiago_description/robots/tiago_no_hand.urdf", moving=joints("arm_{}_joint", 1, 7)
+            ),
+            frame="arm_tool_link",
+            start=(1.4, -0.4, -1.2, 1.5, 0, -0.5, 0.4),
+            acceleration=None,
+            acceleration_source=NOT_PUBLISHED,
+        ),
+        "talos": CatalogueEntry(
+            summary="the left arm of PAL Robotics' Talos, 7 joints, all others locked",
+            model=from_data(
+                "talos_data/robots/talos_reduced.urdf", moving=joints("arm_left_{}_joint", 1, 7)
+            ),
+            frame="gripper_left_base_link",
+            start=(-0.4, 0.9, 0.6, -1.5, 0.5, 0.5, -0.1),
+            acceleration=None,
+            acceleration_source=NOT_PUBLISHED,
+        ),
+        "lwr": CatalogueEntry(
+            summary="KUKA LWR, 7 joints, kinematics only, from its Denavit-Hartenberg table",
+            model=lambda: denavit_hartenberg_arm(
+                "lwr",
+                LWR_TABLE,
+                position_limits=tuple(np.deg2rad((170, 120, 170, 120, 170, 120, 170))),
+                velocity_limits=tuple(np.deg2rad((100, 110, 100, 130, 130, 180, 180))),
+            ),
+            frame="tool",
+            start=(0.0, pi / 4, pi / 4, pi / 4, pi / 4, pi / 4, 0.0),
+            acceleration=(5 * pi / 3,) * 7,
+            acceleration_source="Flacco, De Luca & Khatib 2015 (300 deg/s^2)",
+        ),
+        "planar1r": CatalogueEntry(
+            summary="one joint with limits 0 and 2 pi, that turns a link of 0.4 m",
+            model=lambda: planar_arm((0.4,), velocity_limits=(2.0,), position_limit=(0, 2 * pi)),
+            frame="tip",
+            start=(pi,),
+            acceleration=(10.0,),
+            acceleration_source=IN_CODE_ONLY,
+            task_rows=(5,),
+        ),
+        "planar4r": CatalogueEntry(
+            summary="a planar arm of four links of 0.25 m, built in code",
+            model=lambda: planar_arm((0.25,) * 4, velocity_limits=(2.0, 2.0, 4.0, 4.0)),
+            frame="tip",
+            start=(0.0, pi / 2, -pi / 2, pi / 2),
+            acceleration=(2.0, 2.0, 4.0, 4.0),
+            acceleration_source="Flacco, De Luca & Khatib 2015",
+            task_rows=(0, 1, 5),
+        ),
+        "base": CatalogueEntry(
+            summary="an omnidirectional mobile base in the plane, without limits",
+            model=omnidirectional_base,
+            frame="base",
+            start=(0.0, 0.0, 0.0),
+            acceleration=None,
+            acceleration_source=IN_CODE_ONLY,
+            task_rows=(0, 1, 5),
+        ),
         "planar3r": CatalogueEntry(
             summary="a planar arm of three links (0.4, 0.3, 0.2 m), built in code",
-            model=lambda: planar_arm((0.4, 0.3, 0.2), velocity_limit=2.0),
+            model=lambda: planar_arm((0.4, 0.3, 0.2), velocity_limits=(2.0,) * 3),
             frame="tip",
             start=(0.3, 1.6, 0.6),
             acceleration=(10.0, 10.0, 10.0),
-            acceleration_source="chosen for this arm, which exists in code only",
+            acceleration_source=IN_CODE_ONLY,
             task_rows=(0, 1, 5),
         ),
     }
@@ -170,7 +230,7 @@ def _load_named(name: str) -> Robot:
     model.name = name
     limits = model_limits(model).with_interval("effort", None)
     acceleration = None if entry.acceleration is None else np.array(entry.acceleration, dtype=float)
-    q0 = np.array(entry.start, dtype=float)
+    q0 = pin.integrate(model, pin.neutral(model), np.array(entry.start, dtype=float))
     return Robot(name, model, entry.frame, limits, q0, entry.task_rows, acceleration)
 
 

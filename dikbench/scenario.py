@@ -11,10 +11,12 @@ import pinocchio as pin
 
 from dikbench.array import Array
 from dikbench.certificate import Certificate
+from dikbench.oracle import OracleMotion, follow
 from dikbench.references import Reference
 from dikbench.robot import Robot
 from dikbench.steps import steps_in
-from dikbench.tasks.task import Task
+from dikbench.tasks import Task, TrackingTask
+from dikbench.variation import NO_VARIATION, Variation
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,22 +29,27 @@ class Scenario:
         v0: joint velocity at the start, (nv,) [rad/s]: the reference's own, so that a run does not
             begin with a jump from rest.
         reference: what the task frame should do.
-        gain: gain of the tracking task, 1/s.
+        tracking: the task that follows it: pose, position only or orientation only, with its gain.
         dt: control period [s].
         duration: length of a time-indexed run [s].
         certificate: what makes the scenario what it is.
         tasks: secondary tasks, beside the tracking of the reference.
+        motion: the joint motion from which the path was built, on which the certificate was
+            measured, from q0 on; None where no joint motion follows the reference.
+        variation: what a seed perturbs.
     """
 
     robot: Robot
     q0: Array
     v0: Array
     reference: Reference
-    gain: float
+    tracking: TrackingTask
     dt: float
     duration: float
     certificate: Certificate
     tasks: tuple[Task, ...] = ()
+    motion: OracleMotion | None = None
+    variation: Variation = NO_VARIATION
 
     def __post_init__(self) -> None:
         """Check that a run ends (see `steps_in`)."""
@@ -52,6 +59,11 @@ class Scenario:
     def steps(self) -> int:
         """Number of control steps of a time-indexed run."""
         return steps_in(self.duration, self.dt)
+
+    @cached_property
+    def rows(self) -> tuple[int, ...]:
+        """The rows of the twist (linear; angular) of the task frame that are tracked."""
+        return self.tracking.rows(self.robot)
 
     @cached_property
     def targets(self) -> list[tuple[Any, Any]]:
@@ -70,3 +82,19 @@ class Scenario:
         """Rotations (n + 1, 3, 3) and translations (n + 1, 3) of `targets`."""
         rotations = np.array([X.rotation for X, _ in self.targets])
         return rotations, np.array([X.translation for X, _ in self.targets])
+
+    @cached_property
+    def oracle(self) -> Array | None:
+        """The joint motion that does the task exactly, at every control step, (n + 1, nq).
+
+        None where there is none.
+
+        Raises:
+            DikbenchError: if it cannot be followed at this control period.
+        """
+        if self.motion is None:
+            return None
+        instants = self.dt * np.arange(self.steps + 1, dtype=float)
+        if self.motion.exact is not None:
+            return np.array([self.motion.exact(tau) for tau in instants])
+        return follow(self.robot, self.reference, self.q0, instants, self.tracking)

@@ -1,7 +1,12 @@
-"""Selectors: `name`, `name[parameter=value,...]` or `path/to/file.py:Class[...]`."""
+"""Selectors: `name`, `name[parameter=value,...]` or `path/to/file.py:Class[...]`.
+
+Where a study or the command line selects, a value may be a list, `value|value`; several lists make
+a product.
+"""
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -48,3 +53,25 @@ def parse_selector(text: str) -> Selector:
             raise DikbenchError(f"selector {text!r}: parameter {key!r} is given twice")
         parameters[key] = value
     return Selector(text.strip(), match["name"].strip(), MappingProxyType(parameters))
+
+
+def alternatives(text: str) -> list[str]:
+    """The selectors, one value per parameter, that a selector with lists of values stands for.
+
+    `dls[damping=0.01|0.1]` stands for `dls[damping=0.01]` and `dls[damping=0.1]`; several lists
+    make a product, the last one running fastest.
+
+    Raises:
+        DikbenchError: if the text is no selector, or a value of a list is missing or given twice.
+    """
+    if "|" not in text:
+        return [text]
+    selector = parse_selector(text)
+    lists = [[v.strip() for v in values.split("|")] for values in selector.parameters.values()]
+    for key, values in zip(selector.parameters, lists, strict=True):
+        if not all(values) or len(set(values)) < len(values):
+            raise DikbenchError(f"selector {text!r}: {key} lists an empty value, or one twice")
+    return [
+        f"{selector.name}[{','.join(map('='.join, zip(selector.parameters, chosen, strict=True)))}]"
+        for chosen in itertools.product(*lists)
+    ]

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 from time import perf_counter_ns
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pinocchio as pin
@@ -19,7 +20,6 @@ from dikbench.scenario import Scenario
 from dikbench.solvers.checked import CheckedSolve
 from dikbench.solvers.recheck import Verdicts
 from dikbench.status import STEP_CODE, Status
-from dikbench.tasks import PoseTask
 from dikbench.trace import Trace
 
 ReferenceMode = Literal["time", "path"]
@@ -36,6 +36,9 @@ FARTHEST = 100.0
 FAR_CHECK = 16
 """The task error is looked at every so many steps."""
 
+NOISE_STREAM = 3
+"""Keeps the noise apart from what the same seed draws of the scenario."""
+
 ROUNDING = 1e-9
 """A path is at its end when this share of it is left."""
 
@@ -50,7 +53,7 @@ class Run:
         message: the reason, with the step at which it happened; empty for `ok`.
         kinematics_ns: time in kinematics and in setting up the problems, over all steps [ns].
         law_ns: time in the law, its solver included [ns].
-        jacobians: task Jacobians of the control steps, (n, m, nv).
+        jacobians: task Jacobians of the control steps, (n, m, nv), as the law saw them.
     """
 
     trace: Trace
@@ -75,16 +78,16 @@ class _Recorder:
 
     def jacobians(self, scenario: Scenario) -> Array:
         """The task Jacobians of the steps that were applied, (n, m, nv)."""
-        m, nv = len(scenario.robot.task_rows), scenario.robot.nv
+        m, nv = len(scenario.rows), scenario.robot.nv
         return _joined(self.task_jacobian[: len(self.applied)], m, nv)
 
     def trace(self, scenario: Scenario, tau: Array, verdicts: Verdicts, jacobians: Array) -> Trace:
         """The trace of the steps that were applied; those that went nowhere become `stuck`."""
-        n, nv, m = len(self.applied), scenario.robot.nv, len(scenario.robot.task_rows)
+        n, nv, m = len(self.applied), scenario.robot.nv, len(scenario.rows)
         wanted = _joined(self.wanted[:n], m)
         commanded = _joined(self.commanded, nv)
         achieved = np.einsum("kij,kj->ki", jacobians, commanded)
-        alpha = progress(wanted, achieved, row_weights(scenario.robot.task_rows))
+        alpha = progress(wanted, achieved, row_weights(scenario.rows))
         status, ok = self.status[:n].copy(), STEP_CODE[Status.OK]
         status[(status == ok) & verdicts.lied[:n]] = STEP_CODE[Status.NOT_VERIFIED]
         status[(status == ok) & (alpha < STUCK_PROGRESS)] = STEP_CODE[Status.STUCK]
@@ -117,6 +120,7 @@ def simulate(
     solve: CheckedSolve,
     plant: Plant,
     mode: ReferenceMode = "time",
+    seed: int = 0,
 ) -> Run:
     """Run a law in closed loop over a scenario.
 
@@ -124,8 +128,9 @@ def simulate(
         scenario: the case.
         formulation: the law.
         solve: its solver.
-        plant: what becomes of a commanded velocity.
+        plant: what the law sees of the robot, and what becomes of a commanded velocity.
         mode: whether the reference moves on with the clock or with the progress achieved.
+        seed: of the plant's noise.
 
     Returns:
         The trace and how the run ended; failures of the law are statuses, never exceptions.
@@ -136,7 +141,9 @@ def simulate(
     targets = scenario.targets if mode == "time" else None
     clock = _PathClock(scenario)
     record, tau = _Recorder(steps), dt * np.arange(steps + 1, dtype=float)
-    kinematics, tracking = Kinematics(robot), PoseTask(gain=scenario.gain)
+    kinematics, tracking, drive = Kinematics(robot), scenario.tracking, plant.drive
+    noise = _Noise(plant.noise, seed, model) if plant.noise else None
+    late = deque([scenario.v0] * plant.delay) if plant.delay else None
     q, v_prev, k = _read_only(scenario.q0.copy()), _read_only(scenario.v0.copy()), 0
     kinematics_ns = law_ns = 0
     status, message = ok, ""
@@ -151,8 +158,9 @@ def simulate(
             else:
                 target, twist = scenario.target(clock.tau)
                 tau[k] = clock.tau
+            seen = q if noise is None else noise.on(q)
             start = perf_counter_ns()
-            kinematics.update(q)
+            kinematics.update(seen)
             task = tracking.linearize(kinematics, target, twist)
             task.J.flags.writeable = task.V.flags.writeable = False
             tasks = [task]
@@ -160,8 +168,8 @@ def simulate(
                 more = secondary.linearize(kinematics)
                 more.J.flags.writeable = more.V.flags.writeable = False
                 tasks.append(more)
-            limits = limits_at(q)
-            problem = DikProblem(robot, q, v_prev, dt, tasks, limits)
+            limits = limits_at(seen)
+            problem = DikProblem(robot, seen, v_prev, dt, tasks, limits)
             kinematics_ns += perf_counter_ns() - start
             record.wanted.append(task.V)
             record.task_jacobian.append(task.J)
@@ -173,8 +181,12 @@ def simulate(
             if outcome.square > FASTEST**2:
                 raise TrialEnded(Status.DIVERGED, f"commanded speed above {FASTEST:g} rad/s")
             v.flags.writeable = False  # it is recorded as it is
-            applied = plant(v, limits, dt)
-            if applied is not v:
+            arrived = v
+            if late is not None:
+                late.append(v)
+                arrived = late.popleft()
+            applied = drive(arrived, limits if noise is None else limits_at(q), dt)
+            if applied is not arrived:
                 applied.flags.writeable = False
             if outcome.status is not ok:
                 record.status[k] = STEP_CODE[outcome.status]
@@ -202,6 +214,19 @@ def _read_only(array: Array) -> Array:
     return array
 
 
+class _Noise:
+    """What a measurement adds to the configuration: white and normal, of its own seed."""
+
+    def __init__(self, deviation: float, seed: int, model: Any) -> None:
+        self._deviation, self._model = deviation, model
+        self._random = np.random.default_rng([seed, NOISE_STREAM])
+
+    def on(self, q: Array) -> Array:
+        """The configuration (nq,) as it is seen."""
+        step = self._random.normal(0.0, self._deviation, self._model.nv)
+        return _read_only(pin.integrate(self._model, q, step))
+
+
 class _PathClock:
     """The nominal time of a path-indexed run, which moves on with the progress achieved."""
 
@@ -209,7 +234,7 @@ class _PathClock:
         self.tau = 0.0
         self._duration = scenario.reference.duration
         self._dt = scenario.dt
-        self._weights = row_weights(scenario.robot.task_rows)
+        self._weights = row_weights(scenario.rows)
 
     @property
     def is_over(self) -> bool:

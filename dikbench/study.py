@@ -12,11 +12,19 @@ import msgspec
 
 from dikbench.errors import DikbenchError, unknown
 from dikbench.identity import trial_id
-from dikbench.plants import PLANTS, REFERENCE_MODES
+from dikbench.oracle import ORACLE
+from dikbench.plants import REFERENCE_MODES
 from dikbench.problem import program_of
-from dikbench.registry import make_formulation, make_scenario, scenario_parameters
-from dikbench.selector import parse_selector
+from dikbench.quadratic_program import Program
+from dikbench.registry import (
+    make_formulation,
+    make_plant,
+    make_scenario,
+    scenario_parameters,
+)
+from dikbench.selector import alternatives, parse_selector
 from dikbench.solvers.catalogue import DEFAULT_SOLVER, parse_solver, why_not
+from dikbench.split import SPLITS, check_split
 from dikbench.trial import NO_SOLVER, Trial
 
 DEFAULT_STUDY = "quick"
@@ -60,6 +68,8 @@ class Study(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         cells: formulations with their solvers.
         scenarios: selectors of scenarios.
         plants, references, seeds: see `Trial`.
+        split: "train" or "test" holds the study to the seeds and scenarios of that split (see
+            `dikbench.split`); empty: any.
         example: the scenario whose runs are drawn against time; default: the first one.
         timing: the timing pass; None: no times are taken.
         name: the study's name (from the file's).
@@ -68,12 +78,10 @@ class Study(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     description: str
     cells: Annotated[tuple[Cells, ...], NOT_EMPTY]
     scenarios: Names
-    plants: Annotated[tuple[Literal["ideal", "saturating"], ...], NOT_EMPTY] = (
-        "ideal",
-        "saturating",
-    )
+    plants: Names = ("ideal", "saturating")
     references: Annotated[tuple[Literal["time", "path"], ...], NOT_EMPTY] = ("time",)
     seeds: Annotated[tuple[Annotated[int, msgspec.Meta(ge=0)], ...], NOT_EMPTY] = (0,)
+    split: Literal["", "train", "test"] = ""
     example: str = ""
     timing: TimingSettings | None = None
     name: str = ""
@@ -116,13 +124,32 @@ def load_study(name_or_file: str) -> Study:
         raise DikbenchError(f"study {path}: {_explained(str(error))}") from None
     except msgspec.DecodeError as error:
         raise DikbenchError(f"study {path}: not valid TOML: {error}") from None
-    return msgspec.structs.replace(study, name=study.name or path.stem)
+    return _spread(msgspec.structs.replace(study, name=study.name or path.stem))
+
+
+def _spread(study: Study) -> Study:
+    """The study with one value per parameter in each of its selectors (see `alternatives`)."""
+    cells = tuple(Cells(_each(c.formulations), _each(c.solvers)) for c in study.cells)
+    timing = study.timing
+    if timing is not None:
+        timing = msgspec.structs.replace(timing, scenarios=_each(timing.scenarios))
+    return msgspec.structs.replace(
+        study,
+        cells=cells,
+        scenarios=_each(study.scenarios),
+        plants=_each(study.plants),
+        timing=timing,
+    )
+
+
+def _each(selectors: Sequence[str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(text for given in selectors for text in alternatives(given)))
 
 
 def _explained(reason: str) -> str:
     """An error of msgspec, with the valid keys where the key was wrong."""
     if "Invalid enum value" in reason:
-        return f"{reason}; valid: {', '.join(PLANTS if 'plants' in reason else REFERENCE_MODES)}"
+        return f"{reason}; valid: {', '.join(SPLITS if 'split' in reason else REFERENCE_MODES)}"
     if "unknown field" not in reason:
         return reason
     place = Cells if "$.cells" in reason else TimingSettings if "$.timing" in reason else Study
@@ -154,6 +181,13 @@ def select(base: Study, selection: Selection, *, named: bool) -> Study:
     """
     if selection == Selection():
         return base
+    selection = msgspec.structs.replace(
+        selection,
+        **{
+            axis: _each(getattr(selection, axis))
+            for axis in ("formulations", "scenarios", "solvers", "plants")
+        },
+    )
     cells = base.cells
     if selection.formulations:
         cells = tuple(_cells_for(base, text, named) for text in selection.formulations)
@@ -174,7 +208,7 @@ def select(base: Study, selection: Selection, *, named: bool) -> Study:
 
 
 def _cells_for(base: Study, text: str, named: bool) -> Cells:
-    program = program_of(make_formulation(text))
+    program = _program(text)
     if program is None:
         return Cells((text,))
     if named:
@@ -199,6 +233,12 @@ def expand(study: Study) -> list[PlannedTrial]:
             make_scenario(scenario, study.seeds[0])
         else:
             scenario_parameters(scenario)
+    for plant in study.plants:
+        make_plant(plant)
+    if study.split:
+        other = "test" if study.split == "train" else "train"
+        others = load_study(other).scenarios
+        check_split(study.name, study.split, study.scenarios, study.seeds, others)
     if study.timing is not None and program_of(make_formulation(study.timing.reference)):
         raise DikbenchError(
             f"study {study.name}: timing.reference {study.timing.reference!r} needs a solver; "
@@ -208,8 +248,11 @@ def expand(study: Study) -> list[PlannedTrial]:
     for cells in study.cells:
         for formulation in cells.formulations:
             for solver, skip in _solvers_for(study, formulation, cells.solvers):
+                plants, references = study.plants, study.references
+                if formulation == ORACLE:  # nothing is fed back: there is one way to run it
+                    plants, references = ("ideal",), ("time",)
                 for scenario, plant, reference, seed in itertools.product(
-                    study.scenarios, study.plants, study.references, study.seeds
+                    study.scenarios, plants, references, study.seeds
                 ):
                     trial = Trial(formulation, scenario, solver, plant, reference, seed)
                     name = trial_id(trial)
@@ -217,9 +260,14 @@ def expand(study: Study) -> list[PlannedTrial]:
     return list(planned.values())
 
 
+def _program(formulation: str) -> Program | None:
+    """What a law needs a solver for; the oracle needs none."""
+    return None if formulation == ORACLE else program_of(make_formulation(formulation))
+
+
 def _solvers_for(study: Study, formulation: str, solvers: Sequence[str]) -> list[tuple[str, str]]:
     """The solvers with which a law runs, each with the reason if the pair cannot work."""
-    program = program_of(make_formulation(formulation))
+    program = _program(formulation)
     parsed = [(text, parse_solver(text)) for text in solvers]
     if program is None:
         return [(NO_SOLVER, "")]

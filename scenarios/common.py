@@ -8,9 +8,11 @@ import pinocchio as pin
 from dikbench.array import Array
 from dikbench.errors import DikbenchError
 from dikbench.kinematics import Kinematics
+from dikbench.oracle import POSE
 from dikbench.references import Reference
 from dikbench.robot import Robot
-from dikbench.tasks import PostureTask, Task
+from dikbench.steps import steps_in
+from dikbench.tasks import PostureTask, Task, TrackingTask
 
 POSTURE_WEIGHT = 1e-4
 """Weight of the secondary posture task: strong enough to choose a posture in the null space, weak
@@ -51,20 +53,26 @@ def limits_in_force(robot: Robot, *, acceleration: bool) -> Robot:
     return robot.with_limits(acceleration=robot.available_acceleration)
 
 
-def secondary_tasks(robot: Robot, posture: Array) -> tuple[Task, ...]:
+def secondary_tasks(
+    robot: Robot, posture: Array, tracking: TrackingTask = POSE
+) -> tuple[Task, ...]:
     """Hold a posture in the null space, where the arm has one."""
-    if robot.nv <= len(robot.task_rows):
+    if robot.nv <= len(tracking.rows(robot)):
         return ()
     return (PostureTask(target=posture, gain=1.0, weight=POSTURE_WEIGHT),)
 
 
-def start_velocity(robot: Robot, reference: Reference, q0: Array) -> Array:
+def start_velocity(
+    robot: Robot, reference: Reference, q0: Array, tracking: TrackingTask = POSE
+) -> Array:
     """The joint velocity (nv,) that follows the reference at its beginning, inside the limits."""
     kinematics = Kinematics(robot)
     kinematics.update(q0)
-    rows = np.array(robot.task_rows)
-    J = kinematics.jacobian(robot.frame_id)[rows]
-    v: Array = np.linalg.pinv(J, rcond=1e-6) @ reference.velocity(0.0)[rows]
+    twist = pin.Motion(reference.velocity(0.0))
+    # Only the reference's own velocity: where the start is off the path, the error is not.
+    still = tracking.linearize(kinematics, reference.placement(0.0))
+    moving = tracking.linearize(kinematics, reference.placement(0.0), twist)
+    v: Array = np.linalg.pinv(moving.J, rcond=1e-6) @ (moving.V - still.V)
     limit = robot.limits.velocity
     if limit is None:
         return v
@@ -78,24 +86,9 @@ def placement_of(robot: Robot, q: Array) -> pin.SE3:
     return kinematics.placement(robot.frame_id).copy()
 
 
-def perturbed(robot: Robot, q: Array, seed: int, spread: float, fixed: tuple[int, ...]) -> Array:
-    """A configuration moved by up to `spread` [rad] per joint; seed 0 moves nothing.
+def samples(duration: float, dt: float, most: int = 200) -> Array:
+    """Instants (k + 1,) [s] from end to end at which a certificate is measured.
 
-    Args:
-        robot: the robot.
-        q: the configuration, (nq,).
-        seed: of the random generator.
-        spread: half width of the uniform perturbation [rad].
-        fixed: joints (indices into v) that stay.
-
-    Raises:
-        DikbenchError: on a negative seed.
+    Every control step, or `most` of them where there are more.
     """
-    if seed < 0:
-        raise DikbenchError(f"seed {seed} must not be negative")
-    if seed == 0:
-        return q
-    step = np.random.default_rng(seed).uniform(-spread, spread, robot.nv)
-    step[list(fixed)] = 0.0
-    moved: Array = pin.integrate(robot.model, q, step)
-    return moved
+    return np.linspace(0.0, duration, min(most, max(2, steps_in(duration, dt))) + 1)

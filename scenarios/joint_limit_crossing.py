@@ -14,12 +14,15 @@ import pinocchio as pin
 from dikbench.array import Array
 from dikbench.certificate import Certificate, Claim
 from dikbench.errors import DikbenchError
-from dikbench.oracle import measure_motion
+from dikbench.oracle import joint_oracle
 from dikbench.references import joint_path
 from dikbench.robot_catalogue import load_robot
 from dikbench.scenario import Scenario
-from dikbench.steps import steps_in
-from scenarios.common import between, limits_in_force, perturbed, positive, secondary_tasks
+from dikbench.tasks import PoseTask
+from dikbench.variation import Variation
+from scenarios.common import between, limits_in_force, positive, samples, secondary_tasks
+
+VARIATION = Variation(start=0.1)
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,10 @@ def joint_limit_crossing(
     while q_j is beyond its limit. The UR5 crosses with its base, the Panda with joint 6.
     A seed moves the other joints by up to 0.1 rad.
 
+    Provokes: a path that leads out of a joint's range
+
+    Shows in: position_violation_max_rad, off_course_max_rad
+
     Args:
         robot: ur5 or panda.
         approach: how far inside the limit the motion starts [rad], 0.02 to 3.
@@ -83,7 +90,7 @@ def joint_limit_crossing(
         raise DikbenchError(f"scenario joint-limit-crossing: robot {robot} has no limits")
     where = CROSSINGS[robot]
     j = where.joint
-    start = perturbed(arm, np.array(where.posture), seed, 0.1, (j,))
+    start = VARIATION.drawn(seed).posture(arm, np.array(where.posture), (j,))
     start[j] = position.upper[j] - approach
     amplitude = approach + depth
     duration = pi * amplitude / (speed * velocity.upper[j])
@@ -100,9 +107,7 @@ def joint_limit_crossing(
         v: Array = amplitude * pi / duration * np.sin(2 * pi * tau / duration) * out
         return v
 
-    steps = max(2, steps_in(duration, dt))
-    instants = np.linspace(0.0, duration, steps + 1)
-    motion = measure_motion(arm, np.array([q_r(tau) for tau in instants]), duration / steps)
+    motion = joint_oracle(arm, q_r, samples(duration, dt))
     certificate = Certificate(
         (
             Claim("position margin at the start [rad]", motion.margin[0], 0.9 * approach),
@@ -116,9 +121,11 @@ def joint_limit_crossing(
         q0=start,
         v0=v_r(0.0),
         reference=joint_path(arm, q_r, v_r, duration),
-        gain=gain,
+        tracking=PoseTask(gain=gain),
         dt=dt,
         duration=duration,
         certificate=certificate,
         tasks=secondary_tasks(arm, start),
+        motion=motion,
+        variation=VARIATION,
     )

@@ -20,14 +20,18 @@ from dikbench.references import Reference, screw_path
 from dikbench.robot import Robot
 from dikbench.robot_catalogue import load_robot
 from dikbench.scenario import Scenario
+from dikbench.tasks import PoseTask
+from dikbench.variation import Variation
 from scenarios.common import (
     between,
     limits_in_force,
-    perturbed,
     positive,
+    samples,
     secondary_tasks,
     start_velocity,
 )
+
+VARIATION = Variation(start=0.1)
 
 
 @dataclass(frozen=True)
@@ -108,7 +112,7 @@ def near_miss(
         )
     where = SINGULARITIES[robot, singularity]
     arm = limits_in_force(load_robot(robot), acceleration=acceleration)
-    q_s = perturbed(arm, np.array(where.posture), seed, 0.1, where.fixed)
+    q_s = VARIATION.drawn(seed).posture(arm, np.array(where.posture), where.fixed)
     build = _crossing if where.kind == "crossing" else _fold
     reference, q0, motion = build(arm, where, q_s, miss, speed, dt)
     return Scenario(
@@ -116,11 +120,13 @@ def near_miss(
         q0=q0,
         v0=start_velocity(arm, reference, q0),
         reference=reference,
-        gain=gain,
+        tracking=PoseTask(gain=gain),
         dt=dt,
         duration=reference.duration,
         certificate=_certificate(where, miss, speed, motion),
         tasks=secondary_tasks(arm, q0),
+        motion=motion,
+        variation=VARIATION,
     )
 
 
@@ -148,7 +154,7 @@ def _crossing(
     reference = screw_path(middle, speed * (J @ out), duration)
     seed = pin.integrate(arm.model, q_s, -where.half_length * out)
     q0 = solve_placement(arm, reference.placement(0.0), seed)
-    return reference, q0, oracle_motion(arm, reference, q0, dt)
+    return reference, q0, oracle_motion(arm, reference, q0, samples(reference.duration, dt))
 
 
 def _fold(
@@ -177,7 +183,7 @@ def _fold(
         return (speed if tau >= half else -speed) * inward
 
     reference = Reference(2 * half, placement, velocity)
-    return reference, q0, oracle_motion(arm, reference, q0, dt)
+    return reference, q0, oracle_motion(arm, reference, q0, samples(reference.duration, dt))
 
 
 def _certificate(

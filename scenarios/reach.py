@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import pi
+
 import numpy as np
 import pinocchio as pin
 
@@ -10,15 +12,21 @@ from dikbench.oracle import oracle_motion
 from dikbench.references import Reference, target_at_rest
 from dikbench.robot_catalogue import load_robot
 from dikbench.scenario import Scenario
+from dikbench.tasks import PoseTask
+from dikbench.variation import Variation
 from scenarios.common import (
     between,
     limits_in_force,
-    perturbed,
     placement_of,
     positive,
     secondary_tasks,
     start_velocity,
 )
+
+ROBOTS = ("panda", "ur3", "ur5", "ur10", "xarm7", "talos", "planar3r", "planar4r")
+"""On which its defaults are certified; it takes any."""
+
+VARIATION = Variation(start=0.1, direction=pi)
 
 
 def reach(
@@ -37,7 +45,11 @@ def reach(
 
     The target is `distance` [m] and `angle` [rad] away from the start, along the body axis
     (-1, 1, -1)/sqrt(3) and about it; for a planar arm, along (-1, 1)/sqrt(2) and clockwise. A seed
-    turns the axis and moves the start by up to 0.1 rad per joint.
+    turns the axis, and moves the start by up to 0.1 rad per joint.
+
+    Provokes: nothing; every law must pass
+
+    Shows in: position_error_final_m, orientation_error_final_rad
 
     Args:
         robot: a robot's name, or the path of a URDF.
@@ -56,11 +68,10 @@ def reach(
     between("reach", "distance", distance, 0.01, 0.3)
     between("reach", "angle", angle, 0.0, 1.5)
     arm = limits_in_force(load_robot(robot, frame), acceleration=acceleration)
-    q0 = perturbed(arm, arm.q0, seed, 0.1, fixed=())
+    change = VARIATION.drawn(seed)
+    q0 = change.posture(arm, arm.q0)
     start = placement_of(arm, q0)
-    axis = np.array([-1.0, 1.0, -1.0])
-    if seed:
-        axis = np.random.default_rng(seed).normal(size=3)
+    axis = change.rotation(arm) @ np.array([-1.0, 1.0, -1.0])
     twist = np.zeros(6)
     rows = list(arm.task_rows)
     twist[rows] = np.concatenate([axis, axis])[rows]  # only what the arm can move
@@ -73,7 +84,7 @@ def reach(
         lambda tau: start * pin.exp6(pin.Motion(gain * tau * twist)),
         lambda tau: gain * twist,
     )
-    motion = oracle_motion(arm, straight, q0, straight.duration / 50)
+    motion = oracle_motion(arm, straight, q0, np.linspace(0.0, straight.duration, 51))
     reference = target_at_rest(target, duration)
     certificate = Certificate(
         (
@@ -87,9 +98,10 @@ def reach(
         q0=q0,
         v0=start_velocity(arm, reference, q0),
         reference=reference,
-        gain=gain,
+        tracking=PoseTask(gain=gain),
         dt=dt,
         duration=duration,
         certificate=certificate,
         tasks=secondary_tasks(arm, q0),
+        variation=VARIATION,
     )

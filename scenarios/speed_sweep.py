@@ -4,20 +4,26 @@ from __future__ import annotations
 
 from typing import Literal
 
+import numpy as np
+
 from dikbench.certificate import Certificate, Claim
 from dikbench.oracle import oracle_motion
 from dikbench.references import circle
 from dikbench.robot_catalogue import load_robot
 from dikbench.scenario import Scenario
+from dikbench.tasks import PoseTask
+from dikbench.variation import Variation
 from scenarios.common import (
     between,
     limits_in_force,
-    perturbed,
     placement_of,
     positive,
+    samples,
     secondary_tasks,
     start_velocity,
 )
+
+VARIATION = Variation(start=0.1)
 
 
 def speed_sweep(
@@ -39,6 +45,10 @@ def speed_sweep(
     (another one may not: the arm has a null space). A seed moves the start by up to 0.1 rad per
     joint.
 
+    Provokes: joint speeds beyond the limits, far from any singularity
+
+    Shows in: progress_mean, velocity_violation_max_rad_s
+
     Args:
         robot: panda.
         path: circle.
@@ -57,13 +67,15 @@ def speed_sweep(
     between("speed-sweep", "speed", speed, 0.1, 3.0)
     between("speed-sweep", "radius", radius, 0.02, 0.15)
     arm = limits_in_force(load_robot(robot), acceleration=acceleration)
-    q0 = perturbed(arm, arm.q0, seed, 0.1, fixed=())
+    q0 = VARIATION.drawn(seed).posture(arm, arm.q0)
     start = placement_of(arm, q0)
     # One lap in one second first: joint speeds scale with 1/period.
-    at_one_second = oracle_motion(arm, circle(start, radius, 1.0, 1.0), q0, 1 / 200)
+    at_one_second = oracle_motion(
+        arm, circle(start, radius, 1.0, 1.0), q0, np.linspace(0.0, 1.0, 201)
+    )
     period = float(at_one_second.speed_ratio.max()) / speed
     reference = circle(start, radius, period, laps)
-    motion = oracle_motion(arm, reference, q0, dt)
+    motion = oracle_motion(arm, reference, q0, samples(reference.duration, dt))
     certificate = Certificate(
         (
             Claim(
@@ -81,9 +93,11 @@ def speed_sweep(
         q0=q0,
         v0=start_velocity(arm, reference, q0),
         reference=reference,
-        gain=gain,
+        tracking=PoseTask(gain=gain),
         dt=dt,
         duration=reference.duration,
         certificate=certificate,
         tasks=secondary_tasks(arm, q0),
+        motion=motion,
+        variation=VARIATION,
     )

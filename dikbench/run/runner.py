@@ -16,6 +16,7 @@ from pebble import ProcessExpired
 
 from dikbench.errors import DikbenchError, unknown
 from dikbench.identity import cell_id
+from dikbench.oracle import ORACLE
 from dikbench.run.columns import CELL
 from dikbench.run.progress_display import ProgressDisplay
 from dikbench.run.provenance import environment, git_commit, manifest
@@ -242,7 +243,9 @@ def _time(
         dict.fromkeys(
             cell
             for p in planned
-            if not p.skip and (cell := (p.trial.formulation, p.trial.solver)) not in fatal
+            if not p.skip
+            and p.trial.formulation != ORACLE
+            and (cell := (p.trial.formulation, p.trial.solver)) not in fatal
         )
     )
     if not cells or timing is None:

@@ -16,7 +16,7 @@ import numpy as np
 from dikbench.array import Array
 from dikbench.control_step import TrialEnded, control_step
 from dikbench.kinematics import Kinematics
-from dikbench.plants import PLANTS
+from dikbench.plants import Plant
 from dikbench.problem import DikProblem, Formulation, Solve
 from dikbench.registry import make_formulation
 from dikbench.run.columns import RATES
@@ -25,7 +25,6 @@ from dikbench.run.worker import Row, scenario_of, solve_of
 from dikbench.scenario import Scenario
 from dikbench.simulation import simulate
 from dikbench.solvers.checked import CheckedSolve, make_solve
-from dikbench.tasks import PoseTask
 
 LEAD_IN: Final = 5
 """Problems that are replayed before each timed segment: they bring back what another cell drove out
@@ -53,7 +52,7 @@ class _Recording:
 def record_problems(scenario: Scenario, law: Formulation, count: int) -> list[DikProblem]:
     """The problems of a contiguous segment from the middle of a run of a law without solver."""
     recording = _Recording(law, [])
-    simulate(scenario, recording, make_solve(None, None), PLANTS["ideal"])
+    simulate(scenario, recording, make_solve(None, None), Plant())
     problems = recording.problems
     first = max(0, (len(problems) - count) // 2)
     return problems[first : first + count]
@@ -141,7 +140,7 @@ def _replay(law: Formulation, solve: CheckedSolve, segment: Sequence[DikProblem]
 
 def _time_kinematics(scenario: Scenario, segment: Sequence[DikProblem]) -> Array:
     """Time of setting each problem up again, (problems,) [ns], as `simulate` does it."""
-    robot, tracking = scenario.robot, PoseTask(gain=scenario.gain)
+    robot, tracking = scenario.robot, scenario.tracking
     kinematics = Kinematics(robot)
     found = []
     for number, given in enumerate(segment):

@@ -12,9 +12,10 @@ from typing import Any, Literal
 from dikbench.errors import DikbenchError
 from dikbench.metrics import evaluate
 from dikbench.motion import recompute
-from dikbench.plants import PLANTS
+from dikbench.oracle import ORACLE
 from dikbench.problem import program_of
-from dikbench.registry import make_formulation, make_scenario
+from dikbench.registry import make_formulation, make_plant, make_scenario
+from dikbench.replay import replay_of
 from dikbench.run.provenance import environment
 from dikbench.run.worker_process import calm_down
 from dikbench.scenario import Scenario
@@ -126,14 +127,20 @@ def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "al
     if trial.reference == "path" and not scenario.reference.moving:
         reason = "the scenario has no path that could wait for the robot"
         return row_without_run(trial, Status.SKIPPED, reason)
+    oracle = trial.formulation == ORACLE
+    if oracle and scenario.oracle is None:
+        reason = "no joint motion does what the scenario asks for"
+        return row_without_run(trial, Status.SKIPPED, reason)
+    plant = make_plant(trial.plant)
     mode: ReferenceMode = "path" if trial.reference == "path" else "time"
     start = perf_counter()
     run = simulate(
         scenario,
-        make_formulation(trial.formulation),
-        solve_of(trial.formulation, trial.solver),
-        PLANTS[trial.plant],
+        replay_of(scenario) if oracle else make_formulation(trial.formulation),
+        make_solve(None, None) if oracle else solve_of(trial.formulation, trial.solver),
+        plant,
         mode,
+        trial.seed,
     )
     if trace is not None and (
         policy == "all" or (policy == "failures" and run.status is not Status.OK)
@@ -141,7 +148,8 @@ def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "al
         _keep(run.trace.save, trace)
     metrics: Mapping[str, float] = {}
     if run.trace.steps:
-        metrics = evaluate(recompute(run.trace, scenario, run.jacobians))
+        seen = None if plant.noise else run.jacobians  # with noise, not those of the true motion
+        metrics = evaluate(recompute(run.trace, scenario, seen))
     return {
         **header(trial),
         "status": run.status.value,

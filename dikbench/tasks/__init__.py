@@ -1,7 +1,17 @@
 """What can be wanted of a robot: one task per file."""
 
+from dikbench.tasks.orientation import OrientationTask
 from dikbench.tasks.pose import PoseTask
+from dikbench.tasks.position import PositionTask
 from dikbench.tasks.posture import PostureTask
-from dikbench.tasks.task import LinearizedTask, Task
+from dikbench.tasks.task import LinearizedTask, Task, TrackingTask
 
-__all__ = ["LinearizedTask", "PoseTask", "PostureTask", "Task"]
+__all__ = [
+    "LinearizedTask",
+    "OrientationTask",
+    "PoseTask",
+    "PositionTask",
+    "PostureTask",
+    "Task",
+    "TrackingTask",
+]

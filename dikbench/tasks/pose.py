@@ -11,7 +11,7 @@ import pinocchio as pin
 from dikbench.array import Array
 from dikbench.errors import DikbenchError
 from dikbench.kinematics import Kinematics
-from dikbench.robot import frame_id
+from dikbench.robot import Robot, frame_id
 from dikbench.tasks.task import LinearizedTask
 
 
@@ -38,6 +38,10 @@ class PoseTask:
     weight: float | Array = 1.0
     priority: int = 1
     frame: str | None = None
+
+    def rows(self, robot: Robot) -> tuple[int, ...]:
+        """The rows of the twist (linear; angular) that the task is about."""
+        return robot.task_rows
 
     def linearize(
         self, kinematics: Kinematics, target: Any = None, velocity: Any = None

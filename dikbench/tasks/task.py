@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import msgspec
 import numpy as np
@@ -11,6 +11,7 @@ import scipy.linalg
 
 from dikbench.array import Array
 from dikbench.kinematics import Kinematics
+from dikbench.robot import Robot
 
 
 class LinearizedTask(msgspec.Struct, eq=False):
@@ -66,6 +67,25 @@ class Task(Protocol):
 
     def linearize(self, kinematics: Kinematics) -> LinearizedTask:
         """The task at the configuration of `kinematics`."""
+        ...
+
+
+class TrackingTask(Task, Protocol):
+    """A task whose target moves: it is handed to `linearize` at every step."""
+
+    @property
+    def gain(self) -> float:
+        """1/s."""
+        ...
+
+    def rows(self, robot: Robot) -> tuple[int, ...]:
+        """The rows of the twist (linear; angular) of the task frame that it is about."""
+        ...
+
+    def linearize(
+        self, kinematics: Kinematics, target: Any = None, velocity: Any = None
+    ) -> LinearizedTask:
+        """The task at the configuration of `kinematics`, its target and the target's body twist."""
         ...
 
 

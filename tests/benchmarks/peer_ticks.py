@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from dikbench.robot_catalogue import _data_folder
+from dikbench.robot_data import _data_folder
 from dikbench.scenario import Scenario
 
 Tick = Callable[[], int]
@@ -23,7 +23,7 @@ POSTURE_COST = 1e-2
 def bare_dls_tick(scenario: Scenario) -> Tick:
     """Damped least squares as a roboticist writes it down, on Pinocchio and numpy; no records."""
     model, frame = scenario.robot.model, scenario.robot.frame_id
-    data, dt, gain = model.createData(), scenario.dt, scenario.gain
+    data, dt, gain = model.createData(), scenario.dt, scenario.tracking.gain
     targets = [(X, twist.np) for X, twist in scenario.targets]
     damped = DAMPING**2 * np.eye(6)
 
@@ -48,7 +48,7 @@ def pink_tick(scenario: Scenario) -> Tick:
 
     robot, dt = scenario.robot, scenario.dt
     targets = [X for X, _ in scenario.targets]
-    frame = pink.tasks.FrameTask(robot.frame, 1.0, 1.0, gain=scenario.gain * dt)
+    frame = pink.tasks.FrameTask(robot.frame, 1.0, 1.0, gain=scenario.tracking.gain * dt)
     posture = pink.tasks.PostureTask(POSTURE_COST, gain=dt)
     posture.set_target(scenario.q0)
 
@@ -70,7 +70,7 @@ def mink_tick(scenario: Scenario) -> Tick:
 
     robot, dt = scenario.robot, scenario.dt
     model = mujoco.MjModel.from_xml_string(_bare_urdf())
-    frame = mink.FrameTask(robot.frame, "body", 1.0, 1.0, gain=scenario.gain * dt)
+    frame = mink.FrameTask(robot.frame, "body", 1.0, 1.0, gain=scenario.tracking.gain * dt)
     posture = mink.PostureTask(model, POSTURE_COST, gain=dt)
     names = [robot.model.names[joint] for joint in range(1, robot.model.njoints)]
     assert robot.limits.velocity is not None
@@ -119,7 +119,7 @@ def drake_tick(scenario: Scenario) -> Tick:
         DoDifferentialInverseKinematics,
     )
 
-    robot, dt, gain = scenario.robot, scenario.dt, scenario.gain
+    robot, dt, gain = scenario.robot, scenario.dt, scenario.tracking.gain
     model, frame, data = robot.model, robot.frame_id, robot.model.createData()
     parameters: Any = DifferentialInverseKinematicsParameters(model.nq, model.nv)
     parameters.set_time_step(dt)

@@ -30,7 +30,7 @@ from peer_ticks import bare_dls_tick, drake_tick, mink_tick, pink_tick
 
 from dikbench.limits import JointLimits
 from dikbench.planar_arm import planar_arm
-from dikbench.plants import PLANTS
+from dikbench.plants import Plant
 from dikbench.problem import DikProblem, program_of
 from dikbench.references import circle
 from dikbench.registry import make_formulation, make_scenario
@@ -74,7 +74,7 @@ def our_tick(scenario: Scenario, law: str, solver: str | None) -> Tick:
 
     def run() -> int:
         solve = make_solve(parse_solver(solver) if solver else None, program, checks=False)
-        return simulate(scenario, formulation, solve, PLANTS["ideal"]).trace.steps
+        return simulate(scenario, formulation, solve, Plant()).trace.steps
 
     return run
 
@@ -86,7 +86,7 @@ def without_secondary_tasks(scenario: Scenario) -> Scenario:
         scenario.q0,
         scenario.v0,
         scenario.reference,
-        scenario.gain,
+        scenario.tracking,
         scenario.dt,
         scenario.duration,
         scenario.certificate,
@@ -95,7 +95,7 @@ def without_secondary_tasks(scenario: Scenario) -> Scenario:
 
 def planar_scenario(joints: int, like: Scenario) -> Scenario:
     """A circle for a planar arm of so many equal links, 1.5 m long in all, with a posture task."""
-    model = planar_arm((1.5 / joints,) * joints, velocity_limit=2.0)
+    model = planar_arm((1.5 / joints,) * joints, velocity_limits=(2.0,) * joints)
     q0 = np.full(joints, 1.2 / joints)
     limits: JointLimits = model_limits(model)
     robot = Robot(model.name, model, "tip", limits, q0, task_rows=(0, 1, 5))
@@ -118,7 +118,7 @@ def planar_scenario(joints: int, like: Scenario) -> Scenario:
         q0,
         start_velocity(robot, moved, q0),
         moved,
-        like.gain,
+        like.tracking,
         like.dt,
         moved.duration,
         like.certificate,

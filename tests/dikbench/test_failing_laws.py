@@ -18,7 +18,7 @@ from dikbench.array import Array
 from dikbench.certificate import Certificate
 from dikbench.control_step import fallback
 from dikbench.errors import Infeasible, SolverFailed
-from dikbench.plants import Plant, ideal
+from dikbench.plants import Drive, Plant, ideal
 from dikbench.problem import DikProblem, Formulation, Solve
 from dikbench.quadratic_program import Program, QuadraticProgram
 from dikbench.references import joint_path, target_at_rest
@@ -29,6 +29,7 @@ from dikbench.solvers.answer import Answer
 from dikbench.solvers.catalogue import parse_solver
 from dikbench.solvers.checked import CheckedSolve, make_solve
 from dikbench.status import STEP_CODE, Status
+from dikbench.tasks import PoseTask
 
 RATE = np.array([0.5, -0.4, 0.6])
 
@@ -44,7 +45,7 @@ def _scenario(
         q0=q0,
         v0=rate.copy(),
         reference=joint_path(robot, lambda tau: q0 + tau * rate, lambda tau: rate, duration),
-        gain=2.0,
+        tracking=PoseTask(gain=2.0),
         dt=dt,
         duration=duration,
         certificate=Certificate(()),
@@ -73,13 +74,13 @@ def _run(
     law: Formulation | Callable[[DikProblem], Any],
     scenario: Scenario | None = None,
     *,
-    plant: Plant = ideal,
+    drive: Drive = ideal,
     mode: Any = "time",
     solve: CheckedSolve | None = None,
 ) -> Run:
     formulation = law if isinstance(law, Formulation) else _Law(law)
     chosen = make_solve(None, None) if solve is None else solve
-    return simulate(scenario or _scenario(), formulation, chosen, plant, mode)
+    return simulate(scenario or _scenario(), formulation, chosen, Plant(drive), mode)
 
 
 # --- how laws end a trial

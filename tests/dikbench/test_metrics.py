@@ -16,6 +16,7 @@ from dikbench.references import target_at_rest
 from dikbench.robot_catalogue import load_robot
 from dikbench.scenario import Scenario
 from dikbench.status import STEP_CODE, Status
+from dikbench.tasks import PoseTask
 from dikbench.trace import Trace
 
 # --- metrics of a motion made by hand
@@ -40,7 +41,7 @@ def _scenario() -> Scenario:
         q0=np.array([0.0, np.pi / 2, 0.0]),
         v0=np.array([0.5, 0.0, 0.0]),
         reference=target_at_rest(target, 0.4),
-        gain=1.0,
+        tracking=PoseTask(gain=1.0),
         dt=0.1,
         duration=0.4,
         certificate=Certificate(()),

@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 
 from dikbench.array import Array
 from dikbench.limits import Limits
-from dikbench.plants import PLANTS, ideal, saturating
+from dikbench.plants import DRIVES, ideal, saturating
 from dikbench.robot_catalogue import load_robot
 
 
@@ -39,4 +39,4 @@ def test_without_limits_the_saturating_plant_is_ideal() -> None:
     limits: Limits = free.limits.at(free.q0)
     v = np.array([1e3, -1e3, 0.0])
     assert np.array_equal(saturating(v, limits, 0.01), v)
-    assert PLANTS == {"ideal": ideal, "saturating": saturating}
+    assert DRIVES == {"ideal": ideal, "saturating": saturating}

@@ -11,7 +11,7 @@ import pytest
 
 from dikbench.array import Array
 from dikbench.kinematics import Kinematics
-from dikbench.plants import PLANTS
+from dikbench.plants import Plant, saturating
 from dikbench.problem import DikProblem, Solve
 from dikbench.quadratic_program import Program, QuadraticProgram
 from dikbench.registry import make_scenario
@@ -88,7 +88,7 @@ def test_claims_and_verdicts_of_a_run_reach_the_trace() -> None:
     """Near a singularity the equality is infeasible at most steps, and no lie is an `ok`."""
     scenario = make_scenario("near-miss[robot=ur5,miss=0.005]")
     solve = make_solve(parse_solver("daqp"), "qp")
-    trace = simulate(scenario, HardEquality(), solve, PLANTS["saturating"]).trace
+    trace = simulate(scenario, HardEquality(), solve, Plant(saturating)).trace
     lied = (trace.claimed == 1) & (trace.verified == 0)
     assert trace.share(Status.NOT_VERIFIED) == np.mean(lied)
     assert (trace.claimed == 0).any()

@@ -18,7 +18,7 @@ from dikbench.array import Array
 from dikbench.certificate import Certificate
 from dikbench.errors import DikbenchError, Infeasible
 from dikbench.motion import recompute
-from dikbench.plants import Plant, ideal, saturating
+from dikbench.plants import Drive, Plant, ideal, saturating
 from dikbench.problem import DikProblem, Formulation, Solve
 from dikbench.references import joint_path
 from dikbench.registry import make_formulation, make_scenario
@@ -29,7 +29,7 @@ from dikbench.solvers.catalogue import parse_solver
 from dikbench.solvers.checked import CheckedSolve, make_solve
 from dikbench.solvers.warm.warm_solver import WORKSPACES
 from dikbench.status import STEP_CODE, Status
-from dikbench.tasks import PostureTask
+from dikbench.tasks import PoseTask, PostureTask
 from dikbench.trace import Trace
 
 RATE = np.array([0.5, -0.4, 0.6])
@@ -46,7 +46,7 @@ def _scenario(
         q0=q0,
         v0=rate.copy(),
         reference=joint_path(robot, lambda tau: q0 + tau * rate, lambda tau: rate, duration),
-        gain=2.0,
+        tracking=PoseTask(gain=2.0),
         dt=dt,
         duration=duration,
         certificate=Certificate(()),
@@ -75,13 +75,13 @@ def _run(
     law: Formulation | Callable[[DikProblem], Any],
     scenario: Scenario | None = None,
     *,
-    plant: Plant = ideal,
+    drive: Drive = ideal,
     mode: Any = "time",
     solve: CheckedSolve | None = None,
 ) -> Run:
     formulation = law if isinstance(law, Formulation) else _Law(law)
     chosen = make_solve(None, None) if solve is None else solve
-    return simulate(scenario or _scenario(), formulation, chosen, plant, mode)
+    return simulate(scenario or _scenario(), formulation, chosen, Plant(drive), mode)
 
 
 # --- how long a run is
@@ -165,7 +165,7 @@ def test_a_law_sees_the_state_that_it_made() -> None:
     """The integral of what was applied, what was applied last, and the period."""
     law = _Law(lambda problem: 3 * _exact(problem))
     scenario = _scenario(velocity=1.0)
-    run = _run(law, scenario, plant=saturating)
+    run = _run(law, scenario, drive=saturating)
     assert np.array_equal(law.seen[0].q, scenario.q0)
     assert np.array_equal(law.seen[0].v_prev, scenario.v0)
     clipped = 0
@@ -233,10 +233,10 @@ def test_only_the_ideal_plant_lets_a_command_pass_the_limits(sign: float) -> Non
     def push(problem: DikProblem) -> Array:
         return np.full(3, sign * 5.0)
 
-    position, velocity = _beyond(_run(push, scenario, plant=ideal), scenario)
+    position, velocity = _beyond(_run(push, scenario, drive=ideal), scenario)
     assert position > 0.5
     assert velocity == pytest.approx(3.0 if sign > 0 else 3.5)
-    stopped = _run(push, scenario, plant=saturating)
+    stopped = _run(push, scenario, drive=saturating)
     position, velocity = _beyond(stopped, scenario)
     assert abs(position) < 1e-12  # on the limit, not before it
     assert velocity <= 0.0
@@ -286,7 +286,7 @@ def test_the_same_run_gives_the_same_bits(law: str, solver: str, mode: Any) -> N
     def once(scenario: Scenario) -> Trace:
         formulation = make_formulation(law)
         solve = make_solve(parse_solver(solver) if solver else None, "qp")
-        return simulate(scenario, formulation, solve, saturating, mode).trace
+        return simulate(scenario, formulation, solve, Plant(saturating), mode).trace
 
     scenario = make_scenario("near-miss[miss=0.05,dt=0.01]", seed=1)
     first = once(scenario)

@@ -122,7 +122,7 @@ def test_selectors_stand_in_the_trial_as_they_were_given() -> None:
         (('"reach"', '"reach[distance=7]"'), ("distance=7", "between")),
         (('"reach"', '"reach[robot=ur55]"'), ("ur55", "did you mean 'ur5'")),
         (("description", "seeds = [-1]\ndescription"), ("seeds",)),
-        (("description", 'plants = ["perfect"]\ndescription'), ("perfect", "plants")),
+        (("description", 'plants = ["perfect"]\ndescription'), ("perfect", "plant")),
         (("description", "timing = 3\ndescription"), ("timing",)),
         (("description", "description = 3 #"), ("str", "description")),
         (("description", ""), ("TOML",)),

@@ -65,7 +65,7 @@ def random_states(robot: Robot, count: int, seed: int = 0) -> list[tuple[Array, 
 @functools.cache
 def two_joints() -> Robot:
     """An arm of two joints whose limits are far away."""
-    model = planar_arm((1.0, 1.0), velocity_limit=1e6)
+    model = planar_arm((1.0, 1.0), velocity_limits=(1e6, 1e6))
     return Robot("planar2r", model, "tip", model_limits(model), np.array([0.4, 0.8]), (0, 1))
 
 

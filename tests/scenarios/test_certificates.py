@@ -15,9 +15,10 @@ from dikbench.array import Array
 from dikbench.certificate import Certificate, Claim
 from dikbench.errors import DikbenchError
 from dikbench.kinematics import Kinematics
+from dikbench.plants import Plant
 from dikbench.registry import make_scenario
 from dikbench.robot import Robot
-from dikbench.robot_catalogue import ROBOTS, load_robot
+from dikbench.robot_catalogue import load_robot
 from dikbench.scenario import Scenario
 from dikbench.simulation import simulate
 from dikbench.solvers.checked import make_solve
@@ -38,9 +39,12 @@ SEEDS = (1, 2, 3, 4, 5)
 
 
 def _robots(family: Callable[..., Scenario]) -> tuple[str, ...]:
-    """The robots that a family lists; those of the catalogue where it takes any."""
+    """The robots that a family lists, in its type or, where it takes any, in its module."""
     hint = typing.get_type_hints(family)["robot"]
-    return typing.get_args(hint) if typing.get_origin(hint) is Literal else tuple(ROBOTS)
+    if typing.get_origin(hint) is Literal:
+        return typing.get_args(hint)
+    listed: tuple[str, ...] = sys.modules[family.__module__].ROBOTS
+    return listed
 
 
 SELECTORS = [
@@ -135,7 +139,7 @@ def test_the_same_seed_is_the_same_scenario(selector: str) -> None:
     assert np.array_equal(a.q0, b.q0)
     assert np.array_equal(a.v0, b.v0)
     assert np.array_equal(_samples(a), _samples(b))
-    assert (a.duration, a.dt, a.gain) == (b.duration, b.dt, b.gain)
+    assert (a.duration, a.dt, a.tracking.gain) == (b.duration, b.dt, b.tracking.gain)
     assert a.certificate == b.certificate
 
 
@@ -151,7 +155,7 @@ def test_every_seed_is_another_scenario(selector: str) -> None:
         assert np.abs(perturbed.q0 - scenarios[0].q0).max() < 0.6
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", _robots(SCENARIOS["reach"]))
 def test_seed_zero_of_reach_starts_at_the_robots_start(robot: str) -> None:
     """Nothing is perturbed; another seed moves every joint by at most 0.1 rad."""
     start = load_robot(robot).q0
@@ -220,7 +224,7 @@ def _claims(selector: str) -> tuple[Claim, ...]:
 def test_the_speed_sweep_peaks_at_its_speed(speed: float) -> None:
     """Following it exactly, a law without limits moves at that share of the velocity limits."""
     scenario = make_scenario(f"speed-sweep[speed={speed},dt=0.002,laps=1]")
-    run = simulate(scenario, PseudoInverse(), make_solve(None, None), lambda v, limits, dt: v)
+    run = simulate(scenario, PseudoInverse(), make_solve(None, None), Plant())
     velocity = scenario.robot.limits.velocity
     assert velocity is not None
     assert velocity.usage(run.trace.applied).max() == pytest.approx(speed, rel=0.05)

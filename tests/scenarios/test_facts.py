@@ -9,7 +9,7 @@ import pytest
 
 from dikbench.array import Array
 from dikbench.motion import Motion, recompute
-from dikbench.plants import ideal
+from dikbench.plants import Plant
 from dikbench.problem import program_of
 from dikbench.progress import off_course, progress
 from dikbench.registry import make_formulation, make_scenario
@@ -31,7 +31,7 @@ def _motion(law: str, scenario: str) -> Motion:
     formulation, case = make_formulation(law), make_scenario(scenario)
     program = program_of(formulation)
     solve = make_solve(None if program is None else parse_solver("daqp"), program)
-    run = simulate(case, formulation, solve, ideal)
+    run = simulate(case, formulation, solve, Plant())
     assert run.status is Status.OK
     return recompute(run.trace, case)
 
