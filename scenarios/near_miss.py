@@ -1,12 +1,9 @@
-"""A path that passes a singularity at a chosen distance and speed."""
+"""A path that passes a singularity at a chosen distance and speed, on any arm."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from math import atan, pi
-from types import MappingProxyType
-from typing import Any, Literal
+from collections.abc import Iterator
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -14,64 +11,34 @@ import pinocchio as pin
 from dikbench.array import Array
 from dikbench.certificate import Certificate, Claim
 from dikbench.errors import DikbenchError
-from dikbench.kinematics import Kinematics
 from dikbench.oracle import OracleMotion, oracle_motion, solve_placement
 from dikbench.references import Reference, screw_path
 from dikbench.robot import Robot
 from dikbench.robot_catalogue import load_robot
 from dikbench.scenario import Scenario
+from dikbench.singularity import Singularity, analyse, make_singular, singular_postures
 from dikbench.tasks import PoseTask
-from dikbench.variation import Variation
-from scenarios.common import (
-    between,
-    limits_in_force,
-    positive,
-    samples,
-    secondary_tasks,
-    start_velocity,
-)
+from dikbench.variation import Perturbation, Variation
+from scenarios.common import between, limits_in_force, positive, secondary_tasks, start_velocity
+from scenarios.singular_postures import SINGULAR_POSTURES, SingularityName, SingularPosture
 
-VARIATION = Variation(start=0.1)
+ROBOTS = tuple(SINGULAR_POSTURES)
+"""Of which singular postures are known by name; it takes any."""
 
+VARIATION = Variation(start=0.1, timing=0.1)
 
-@dataclass(frozen=True)
-class Singularity:
-    """A singular posture and how to pass it.
+MARGIN = 0.05
+"""Least distance of the motion to a position limit [rad]: it is not about limits."""
 
-    Attributes:
-        posture: q_s [rad].
-        kind: `crossing`, if the arm can move through it and out on the other side, or `fold`, if
-            it is the edge of the reachable space.
-        joint: the joint (index into v) that leads out of it.
-        fixed: the joints that make it singular, which a seed leaves alone.
-        half_length: s0, half the length of the path [rad of that joint; m for a fold].
-    """
-
-    posture: tuple[float, ...]
-    kind: Literal["crossing", "fold"]
-    joint: int
-    fixed: tuple[int, ...]
-    half_length: float
-
-
-_UR_WRIST = Singularity((0.3, -1.2, 1.4, -1.0, 0.0, 0.2), "crossing", 4, (4,), 0.3)
-_PANDA_STRETCHED = -(atan(0.0825 / 0.316) + atan(0.0825 / 0.384))
-
-SINGULARITIES: Mapping[tuple[str, str], Singularity] = MappingProxyType(
-    {
-        ("ur5", "wrist"): _UR_WRIST,
-        ("ur10", "wrist"): _UR_WRIST,
-        ("panda", "elbow"): Singularity(
-            (0.0, 0.3, 0.0, _PANDA_STRETCHED, 0.0, 1.6, pi / 4), "fold", 3, (2, 3, 4), 0.15
-        ),
-    }
-)
+SAMPLES = 100
+"""Of the motion on each side of the nearest point."""
 
 
 def near_miss(
-    robot: Literal["ur5", "ur10", "panda"] = "ur5",
+    robot: str = "ur5",
     *,
-    singularity: Literal["wrist", "elbow"] = "wrist",
+    frame: str | None = None,
+    singularity: Literal["auto", "wrist", "elbow", "shoulder"] = "auto",
     miss: float = 0.02,
     speed: float = 0.5,
     gain: float = 5.0,
@@ -82,20 +49,28 @@ def near_miss(
     """A path that passes a singularity at the distance `miss` and the speed `speed`.
 
     At the singular posture q_s, X_s the placement, J = U S V^T the body Jacobian (m, rad), n = u_m
-    the twist that is lost there. A crossing (a wrist) is passed along a single joint's motion d:
-    X(s) = X_s exp6(miss n) exp6(s J d), s in [-s0, s0], n with its largest component negative; the
-    speed that it asks for grows as speed/miss, while miss = 0 asks for the single joint's own
-    speed. A fold (an elbow) is
-    touched from inside: X(s) = X_s exp6((miss + |s|) n_in). A seed moves the other joints of q_s by
-    up to 0.1 rad.
+    the twist that is lost there. A crossing (the wrist of a six-axis arm) is passed along a single
+    joint's motion d: X(s) = X_s exp6(miss n) exp6(s J d), s in [-s0, s0], n with its largest
+    component negative unless only the other side can be followed; the speed that it asks for grows
+    as speed/miss, while miss = 0 asks for the single joint's own speed. A fold (an elbow) or a
+    saddle (shoulder and wrist of a seven-axis arm) is touched along n from the side to which the
+    arm bends: X(s) = X_s exp6((miss + |s|) n), and the speed grows as speed/sqrt(miss). See
+    `dikbench.singularity` for how they are told apart. A seed moves the joints of the posture from
+    which q_s is solved by up to 0.1 rad, and changes the speed by up to 10 %.
+
+    Provokes: joint speeds beyond the limits near a singularity
+
+    Shows in: velocity_peak_ratio, off_course_max_rad, progress_min
 
     Args:
-        robot: ur5 and ur10 (wrist), panda (elbow).
-        singularity: wrist or elbow.
+        robot: a robot's name, or the path of a URDF.
+        frame: its task frame; default: the robot's.
+        singularity: wrist, elbow or shoulder, where the robot's are known; auto: the first of those
+            that are known, else the first one that is found from the robot's start outwards.
         miss: length of the unit body twist n by which the path misses [m; rad]: 0 or 0.001 to 0.2
-            (crossing), 0.002 to 0.1 (fold).
+            (crossing), 0.002 to 0.1 (fold, saddle).
         speed: ds/dt [rad/s] of the joint (crossing), or along the unit twist n, mostly a
-            translation [m/s] (fold); 0.02 to 3.
+            translation [m/s] (fold, saddle); 0.02 to 3.
         gain: of the tracking task, 1/s.
         dt: control period [s].
         acceleration: whether acceleration limits are in force.
@@ -105,16 +80,18 @@ def near_miss(
     """
     positive("near-miss", gain=gain, dt=dt)
     between("near-miss", "speed", speed, 0.02, 3.0)
-    if (robot, singularity) not in SINGULARITIES:
-        valid = ", ".join(f"robot={r},singularity={s}" for r, s in SINGULARITIES)
-        raise DikbenchError(
-            f"scenario near-miss: robot {robot} has no {singularity} here; valid: {valid}"
-        )
-    where = SINGULARITIES[robot, singularity]
-    arm = limits_in_force(load_robot(robot), acceleration=acceleration)
-    q_s = VARIATION.drawn(seed).posture(arm, np.array(where.posture), where.fixed)
-    build = _crossing if where.kind == "crossing" else _fold
-    reference, q0, motion = build(arm, where, q_s, miss, speed, dt)
+    arm = limits_in_force(load_robot(robot, frame), acceleration=acceleration)
+    change = VARIATION.drawn(seed)
+    pace = speed / change.pace
+    if singularity == "auto" and arm.name not in SINGULAR_POSTURES:
+        passage = _first_found(arm, miss, pace, change)
+    else:
+        known = _known(arm, singularity)
+        seeded = pin.integrate(arm.model, pin.neutral(arm.model), np.array(known.posture))
+        q_s = make_singular(arm, change.posture(arm, seeded))
+        passage = _passage(arm, analyse(arm, q_s), miss, pace, known.half_length)
+    reference, motion = passage.reference, passage.motion
+    q0 = motion.q[0]
     return Scenario(
         robot=arm,
         q0=q0,
@@ -123,83 +100,145 @@ def near_miss(
         tracking=PoseTask(gain=gain),
         dt=dt,
         duration=reference.duration,
-        certificate=_certificate(where, miss, speed, motion),
+        certificate=passage.certificate,
         tasks=secondary_tasks(arm, q0),
         motion=motion,
         variation=VARIATION,
     )
 
 
-def _lost_twist(arm: Robot, q_s: Array) -> tuple[Any, Array, Array]:
-    """Placement, body Jacobian (6, nv) and lost unit twist (6,) at a singular posture."""
-    kinematics = Kinematics(arm)
-    kinematics.update(q_s)
-    J = kinematics.jacobian(arm.frame_id)
-    n: Array = np.linalg.svd(J)[0][:, -1]
-    if n[np.argmax(np.abs(n))] > 0:
-        n = -n
-    return kinematics.placement(arm.frame_id).copy(), J, n
+class _Passage(NamedTuple):
+    """A path past a singularity, the motion that follows it, and what it claims."""
+
+    reference: Reference
+    motion: OracleMotion
+    certificate: Certificate
 
 
-def _crossing(
-    arm: Robot, where: Singularity, q_s: Array, miss: float, speed: float, dt: float
-) -> tuple[Reference, Array, OracleMotion]:
-    if miss != 0:
-        between("near-miss", "miss", miss, 0.001, 0.2)
-    X_s, J, n = _lost_twist(arm, q_s)
-    out = np.zeros(arm.nv)
-    out[where.joint] = 1.0
-    duration = 2 * where.half_length / speed
-    middle = X_s * pin.exp6(pin.Motion(miss * n))
-    reference = screw_path(middle, speed * (J @ out), duration)
-    seed = pin.integrate(arm.model, q_s, -where.half_length * out)
-    q0 = solve_placement(arm, reference.placement(0.0), seed)
-    return reference, q0, oracle_motion(arm, reference, q0, samples(reference.duration, dt))
+def _known(arm: Robot, singularity: SingularityName | Literal["auto"]) -> SingularPosture:
+    """The posture of a name; of `auto`, the robot's first."""
+    postures = SINGULAR_POSTURES.get(arm.name, {})
+    if singularity == "auto":
+        return next(iter(postures.values()))
+    if singularity not in postures:
+        valid = ", ".join(["auto", *postures])
+        raise DikbenchError(
+            f"scenario near-miss: no {singularity} of robot {arm.name} is known; "
+            f"valid: singularity={valid}"
+        )
+    return postures[singularity]
 
 
-def _fold(
-    arm: Robot, where: Singularity, q_s: Array, miss: float, speed: float, dt: float
-) -> tuple[Reference, Array, OracleMotion]:
-    between("near-miss", "miss", miss, 0.002, 0.1)
-    X_s, _, n = _lost_twist(arm, q_s)
-    bent = q_s.copy()
-    bent[where.joint] -= 0.4
-    half = where.half_length / speed
-    for inward in (n, -n):
+def _first_found(arm: Robot, miss: float, speed: float, change: Perturbation) -> _Passage:
+    """Past the first singular posture, from the robot's start outwards, that certifies."""
+    reason = "none is inside the position limits"
+    for q in singular_postures(arm, 4 * MARGIN):
+        for half_length in (0.3, 0.15, 0.08):
+            try:
+                q_s = make_singular(arm, change.posture(arm, q))
+                passage = _passage(arm, analyse(arm, q_s), miss, speed, half_length)
+                passage.certificate.check("near-miss")
+            except DikbenchError as error:
+                reason = str(error)
+                continue
+            return passage
+    raise DikbenchError(
+        f"scenario near-miss: no singular posture of robot {arm.name} (frame {arm.frame}) can be "
+        f"passed with miss={miss}, speed={speed:.3g}; the last one tried: {reason}"
+    )
+
+
+def _passage(
+    arm: Robot, where: Singularity, miss: float, speed: float, half_length: float
+) -> _Passage:
+    """The first way past a singularity that can be followed inside the position limits."""
+    if where.kind != "crossing" or miss != 0:
+        low, high = (0.001, 0.2) if where.kind == "crossing" else (0.002, 0.1)
+        between("near-miss", "miss", miss, low, high)
+    ways = _crossings if where.kind == "crossing" else _folds
+    found: list[_Passage] = []
+    reason = ""
+    for reference, seed in ways(arm, where, miss, speed, half_length):
         try:
-            q0 = solve_placement(
-                arm, X_s * pin.exp6(pin.Motion((miss + where.half_length) * inward)), bent
-            )
-            break
-        except DikbenchError:
+            q0 = solve_placement(arm, reference.placement(0.0), seed)
+            instants = _instants(half_length, miss, reference.duration)
+            motion = oracle_motion(arm, reference, q0, instants)
+        except DikbenchError as error:
+            reason = str(error)
             continue
-    else:
-        raise DikbenchError(f"scenario near-miss: no side of the fold of {arm.name} can be reached")
+        found.append(_Passage(reference, motion, _certificate(arm, where, miss, speed, motion)))
+        if motion.margin.min() >= MARGIN:
+            return found[-1]
+    if not found:
+        raise DikbenchError(f"scenario near-miss: the path cannot be followed: {reason}")
+    return max(found, key=lambda passage: float(passage.motion.margin.min()))
+
+
+def _crossings(
+    arm: Robot, where: Singularity, miss: float, speed: float, half_length: float
+) -> Iterator[tuple[Reference, Array]]:
+    """Paths along the joint that leads out fastest, on either side, and seeds of their starts."""
+    out = np.zeros(arm.nv)
+    out[np.argmax(where.growth)] = 1.0
+    twist = np.zeros(6)
+    twist[list(arm.task_rows)] = where.jacobian @ out
+    seed = pin.integrate(arm.model, where.q, -half_length * out)
+    for side in (1.0, -1.0):
+        middle = where.placement * pin.exp6(pin.Motion(side * miss * where.lost))
+        yield screw_path(middle, speed * twist, 2 * half_length / speed), seed
+
+
+def _folds(
+    arm: Robot, where: Singularity, miss: float, speed: float, half_length: float
+) -> Iterator[tuple[Reference, Array]]:
+    """The path from inside towards the edge and back, and the two ways to bend for it."""
+    inward, half = where.inward * where.lost, half_length / speed
 
     def placement(tau: float) -> Any:
-        return X_s * pin.exp6(pin.Motion((miss + speed * abs(tau - half)) * inward))
+        return where.placement * pin.exp6(pin.Motion((miss + speed * abs(tau - half)) * inward))
 
     def velocity(tau: float) -> Array:
         return (speed if tau >= half else -speed) * inward
 
     reference = Reference(2 * half, placement, velocity)
-    return reference, q0, oracle_motion(arm, reference, q0, samples(reference.duration, dt))
+    # To second order: curvature z^2 / 2 along n for a motion z of the joints.
+    far = np.sqrt(2 * (miss + half_length) / where.curvature)
+    for side in (1.0, -1.0):
+        bent = side * min(far, 1.0) * where.bend
+        yield reference, pin.integrate(arm.model, where.q, bent)
+
+
+def _instants(half_length: float, miss: float, duration: float) -> Array:
+    """Instants (2 SAMPLES + 1,) [s], dense about the nearest point as the speed is high there."""
+    if miss == 0:
+        return np.linspace(0.0, duration, 2 * SAMPLES + 1)
+    end = np.arcsinh(half_length / miss)
+    share = miss / half_length * np.sinh(np.linspace(-end, end, 2 * SAMPLES + 1))
+    instants: Array = duration / 2 * (1.0 + share)
+    instants[0], instants[-1] = 0.0, duration
+    return instants
 
 
 def _certificate(
-    where: Singularity, miss: float, speed: float, motion: OracleMotion
+    arm: Robot, where: Singularity, miss: float, speed: float, motion: OracleMotion
 ) -> Certificate:
-    sigma = float(motion.sigma_min.min())
+    sigma, limit = motion.sigma_min, arm.limits.velocity
+    peak = float(np.abs(motion.v).max())
     claims = [
-        Claim("smallest singular value on the path (m, rad)", sigma, at_most=0.15),
-        Claim("its ratio to the one at the start", sigma / motion.sigma_min[0], at_most=0.7),
-        Claim("position margin on the path [rad]", motion.margin.min(), at_least=0.05),
+        Claim("smallest singular value on the path (m, rad)", sigma.min(), at_most=0.17),
+        Claim("its ratio to the largest one", sigma.min() / sigma.max(), at_most=0.7),
+        Claim("smallest singular value at the start (m, rad)", sigma[0], at_least=0.02),
+        Claim("position margin on the path [rad]", motion.margin.min(), at_least=MARGIN),
     ]
-    # Near a crossing the speed grows as 1/miss, near a fold as 1/sqrt(miss); with room to spare.
-    if miss > 0:
-        least = 0.15 * speed / miss if where.kind == "crossing" else 0.6 * speed / np.sqrt(miss)
-        claims.append(Claim("required speed over limit", motion.speed_ratio.max(), least))
+    if where.kind != "crossing":
+        # The bend z needs curvature z^2 / 2 = miss: dz/dt = speed / sqrt(2 curvature miss).
+        expected = speed / np.sqrt(2 * where.curvature * miss) * float(np.abs(where.bend).max())
+        claims.append(Claim("peak joint speed [rad/s]", peak, at_least=0.5 * expected))
+    elif miss > 0:
+        least = 0.5 * float(where.growth.max()) * speed / miss
+        claims.append(Claim("peak joint speed [rad/s]", peak, at_least=least))
     else:
-        own = 0.5 * speed  # the single joint's own, over a limit of some 3 rad/s
-        claims.append(Claim("required speed over limit", motion.speed_ratio.max(), at_most=own))
+        claims.append(Claim("peak joint speed [rad/s]", peak, at_most=1.2 * speed))
+    if limit is not None:
+        claims.append(Claim("required speed over limit", motion.peak_speed_ratio))
     return Certificate(tuple(claims))
