@@ -245,8 +245,14 @@ def list_(subject: str | None) -> None:
 
 @commands.command()
 @click.argument("name")
+@click.option(
+    "--figure",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="Draw a scenario: its path, the robot, singular values and margins (.svg, .png, .pdf).",
+)
 @one_line_errors
-def show(name: str) -> None:
+def show(name: str, figure: Path | None) -> None:
     """Print one law, scenario, solver, robot, metric or study in full.
 
     A scenario's selector prints its certificate as well.
@@ -254,3 +260,8 @@ def show(name: str) -> None:
     from dikbench.listing import description
 
     click.echo(description(name))
+    if figure is not None:
+        from dikbench.report.scenario_figure import draw_scenario
+
+        draw_scenario(name, figure)
+        click.echo(f"\n{figure}")

@@ -10,6 +10,7 @@ import numpy as np
 
 from dikbench.errors import unknown
 from dikbench.metrics import METRICS
+from dikbench.oracle import ORACLE
 from dikbench.registry import Plugin, formulation_plugin, make_scenario, plugins
 from dikbench.robot_catalogue import ROBOTS, load_robot
 from dikbench.selector import parse_selector
@@ -31,9 +32,21 @@ def _aligned(rows: list[tuple[str, str, str]]) -> list[str]:
     ]
 
 
-def _plugins(kind: str) -> list[tuple[str, str, str]]:
-    found = plugins("formulation" if kind == "formulations" else "scenario")
-    return [(plugin.name, plugin.summary.rstrip("."), plugin.source) for plugin in found.values()]
+def _formulations() -> list[tuple[str, str, str]]:
+    laws = plugins("formulation").values()
+    summary = "Not a law: the joint motion from which a scenario's path was built, scored like one"
+    return [
+        *((law.name, law.summary.rstrip("."), law.source) for law in laws),
+        (ORACLE, summary, ""),
+    ]
+
+
+def _scenarios() -> list[tuple[str, str, str]]:
+    """What each family provokes and which metrics show it; its summary where it does not say."""
+    return [
+        (f.name, f.paragraph("Provokes") or f.summary.rstrip("."), f.paragraph("Shows in"))
+        for f in plugins("scenario").values()
+    ]
 
 
 def _solvers() -> list[tuple[str, str, str]]:
@@ -51,8 +64,8 @@ def _metrics() -> list[tuple[str, str, str]]:
 
 
 _SUBJECTS: Mapping[str, Callable[[], list[tuple[str, str, str]]]] = {
-    "formulations": lambda: _plugins("formulations"),
-    "scenarios": lambda: _plugins("scenarios"),
+    "formulations": _formulations,
+    "scenarios": _scenarios,
     "solvers": _solvers,
     "robots": lambda: [(name, entry.summary, "") for name, entry in ROBOTS.items()],
     "metrics": _metrics,
@@ -68,14 +81,12 @@ def description(text: str) -> str:
     """
     selector = parse_selector(text)
     name = selector.name
+    if name == ORACLE:
+        return f"{ORACLE}: {_formulations()[-1][1]}"
     if name in plugins("formulation") or ".py:" in name:
         return _plugin(formulation_plugin(name))
     if name in plugins("scenario"):
-        claims = make_scenario(text).certificate.claims
-        return "\n".join(
-            [_plugin(plugins("scenario")[name]), "", f"Certificate of {text}:"]
-            + [f"  {claim}" for claim in claims]
-        )
+        return "\n".join([_plugin(plugins("scenario")[name]), "", *_difficulty(text)])
     if name in BACK_ENDS:
         return _solver(name)
     if name in ROBOTS:
@@ -105,6 +116,27 @@ def _plugin(plugin: Plugin) -> str:
             *(parameters or ["  none"]),
         ]
     )
+
+
+def _difficulty(text: str) -> list[str]:
+    """The certificate of a scenario, and what its own joint motion asks of the robot."""
+    scenario = make_scenario(text)
+    lines = [f"Certificate of {text}:", *(f"  {claim}" for claim in scenario.certificate.claims)]
+    motion = scenario.motion
+    if motion is None:
+        lines += ["", "No joint motion does what it asks for."]
+    else:
+        sigma, margin, reach = motion.sigma_min, motion.margin, motion.reach
+        lines += [
+            "",
+            f"The joint motion that does it, in {len(motion.instants)} samples "
+            f"({scenario.duration:.4g} s, {scenario.steps} control steps):",
+            f"  smallest singular value (m, rad): {sigma.min():.4g} to {sigma.max():.4g}",
+            f"  margin to the position limits [rad]: {margin.min():.4g} to {margin.max():.4g}",
+            f"  required speed over limit: up to {motion.peak_speed_ratio:.4g}",
+            f"  reach from the first joint [m]: {reach.min():.4g} to {reach.max():.4g}",
+        ]
+    return [*lines, "", f"A seed perturbs: {scenario.variation}."]
 
 
 def _solver(name: str) -> str:

@@ -57,7 +57,11 @@ class Plugin:
     @property
     def source(self) -> str:
         """The paragraph `Source: ...` of its docstring, on one line."""
-        _, _, text = (inspect.getdoc(self.documented) or "").partition("Source: ")
+        return self.paragraph("Source")
+
+    def paragraph(self, title: str) -> str:
+        """The paragraph `title: ...` of its docstring, on one line; empty where there is none."""
+        _, _, text = (inspect.getdoc(self.documented) or "").partition(f"{title}: ")
         return " ".join(text.partition("\n\n")[0].split()).rstrip(".")
 
     @cached_property

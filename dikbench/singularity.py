@@ -150,7 +150,7 @@ def make_singular(robot: Robot, seed: Array, *, fixed: tuple[int, ...] = ()) -> 
     )
 
 
-def singular_postures(robot: Robot, margin: float, attempts: int = 40) -> Iterator[Array]:
+def singular_postures(robot: Robot, margin: float, attempts: int = 24) -> Iterator[Array]:
     """Singular postures (nq,) inside the position limits, from the robot's start outwards.
 
     Args:

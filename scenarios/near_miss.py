@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from dikbench.references import Reference, screw_path
 from dikbench.robot import Robot
 from dikbench.robot_catalogue import load_robot
 from dikbench.scenario import Scenario
-from dikbench.singularity import Singularity, analyse, make_singular, singular_postures
+from dikbench.singularity import Kind, Singularity, analyse, make_singular, singular_postures
 from dikbench.tasks import PoseTask
 from dikbench.variation import Perturbation, Variation
 from scenarios.common import between, limits_in_force, positive, secondary_tasks, start_velocity
@@ -29,6 +30,14 @@ VARIATION = Variation(start=0.1, timing=0.1)
 
 MARGIN = 0.05
 """Least distance of the motion to a position limit [rad]: it is not about limits."""
+
+HALF_LENGTHS: Mapping[Kind, tuple[float, ...]] = MappingProxyType(
+    {"crossing": (0.3,), "fold": (0.15, 0.08), "saddle": (0.15, 0.08)}
+)
+"""Half lengths of the path that are tried where none is known (see `SingularPosture`)."""
+
+LEAST_GROWTH = 0.01
+"""Of the smallest singular value (m, rad) per rad of the joint that leads out."""
 
 SAMPLES = 100
 """Of the motion on each side of the nearest point."""
@@ -68,7 +77,7 @@ def near_miss(
         singularity: wrist, elbow or shoulder, where the robot's are known; auto: the first of those
             that are known, else the first one that is found from the robot's start outwards.
         miss: length of the unit body twist n by which the path misses [m; rad]: 0 or 0.001 to 0.2
-            (crossing), 0.002 to 0.1 (fold, saddle).
+            (crossing), 0.002 to 0.05 (fold, saddle).
         speed: ds/dt [rad/s] of the joint (crossing), or along the unit twist n, mostly a
             translation [m/s] (fold, saddle); 0.02 to 3.
         gain: of the tracking task, 1/s.
@@ -133,10 +142,13 @@ def _first_found(arm: Robot, miss: float, speed: float, change: Perturbation) ->
     """Past the first singular posture, from the robot's start outwards, that certifies."""
     reason = "none is inside the position limits"
     for q in singular_postures(arm, 4 * MARGIN):
-        for half_length in (0.3, 0.15, 0.08):
+        try:
+            where = analyse(arm, make_singular(arm, change.posture(arm, q)))
+        except DikbenchError:  # two singularities in one
+            continue
+        for half_length in HALF_LENGTHS[where.kind]:
             try:
-                q_s = make_singular(arm, change.posture(arm, q))
-                passage = _passage(arm, analyse(arm, q_s), miss, speed, half_length)
+                passage = _passage(arm, where, miss, speed, half_length)
                 passage.certificate.check("near-miss")
             except DikbenchError as error:
                 reason = str(error)
@@ -153,8 +165,10 @@ def _passage(
 ) -> _Passage:
     """The first way past a singularity that can be followed inside the position limits."""
     if where.kind != "crossing" or miss != 0:
-        low, high = (0.001, 0.2) if where.kind == "crossing" else (0.002, 0.1)
+        low, high = (0.001, 0.2) if where.kind == "crossing" else (0.002, 0.05)
         between("near-miss", "miss", miss, low, high)
+    if where.kind == "crossing" and where.growth.max() < LEAST_GROWTH:
+        raise DikbenchError("scenario near-miss: no single joint leads out of the singularity")
     ways = _crossings if where.kind == "crossing" else _folds
     found: list[_Passage] = []
     reason = ""

@@ -37,7 +37,7 @@ def _ur_shoulder(half_length: float) -> SingularPosture:
 
 SINGULAR_POSTURES: Mapping[str, Mapping[SingularityName, SingularPosture]] = MappingProxyType(
     {
-        "ur3": {"wrist": _UR_WRIST, "elbow": _ur_elbow(0.1), "shoulder": _ur_shoulder(0.06)},
+        "ur3": {"wrist": _UR_WRIST, "elbow": _ur_elbow(0.13), "shoulder": _ur_shoulder(0.06)},
         "ur5": {"wrist": _UR_WRIST, "elbow": _ur_elbow(0.15), "shoulder": _ur_shoulder(0.12)},
         "ur10": {"wrist": _UR_WRIST, "elbow": _ur_elbow(0.15), "shoulder": _ur_shoulder(0.15)},
         "panda": {
