@@ -165,8 +165,11 @@ def measure_motion(
 
 
 def position_margin(robot: Robot, q: Array) -> float:
-    """Smallest distance [rad] of a configuration (nq,) to a position limit, negative outside."""
-    limits = robot.limits.at(q)
+    """Smallest distance [rad] of a configuration (nq,) to a position limit, negative outside.
+
+    Of the joints that move the task frame.
+    """
+    limits, chain = robot.limits.at(q), robot.chain
     if limits.to_lower is None or limits.to_upper is None:
         return float("inf")
-    return float(min(limits.to_lower.min(), limits.to_upper.min()))
+    return float(min(limits.to_lower[chain].min(), limits.to_upper[chain].min()))

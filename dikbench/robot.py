@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from dikbench.array import Array
+from dikbench.array import Array, Indices
 from dikbench.errors import DikbenchError, unknown
 from dikbench.limits import NO_LIMIT, Interval, JointLimits
 
@@ -64,6 +64,18 @@ class Robot:
     def nv(self) -> int:
         """Number of velocities."""
         return int(self.model.nv)
+
+    @cached_property
+    def chain(self) -> Indices:
+        """The velocities (indices into v) that move the task frame: not those of a gripper."""
+        model = self.model
+        carrying = model.supports[model.frames[self.frame_id].parentJoint]
+        moved = [
+            range(joint.idx_v, joint.idx_v + joint.nv)
+            for joint in (model.joints[index] for index in carrying)
+            if joint.idx_v >= 0
+        ]
+        return np.array([index for indices in moved for index in indices], dtype=np.intp)
 
     def reach_of(self, placement: Any) -> float:
         """Distance [m] of a placement (`pinocchio.SE3`) from the origin of the first joint."""

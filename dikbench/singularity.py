@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -12,6 +12,7 @@ import pinocchio as pin
 from dikbench.array import Array
 from dikbench.errors import DikbenchError
 from dikbench.kinematics import Kinematics
+from dikbench.oracle import position_margin
 from dikbench.robot import Robot
 
 STEP: Final = 1e-5
@@ -62,6 +63,17 @@ class Singularity:
     bend: Array
     curvature: float
     growth: Array
+
+    def oriented_like(self, other: Singularity) -> Singularity:
+        """The same, `lost` and `bend` with the signs that a posture nearby has.
+
+        The signs of singular vectors mean nothing, and may change from one posture to the next.
+        """
+        turned = float(np.sign(self.lost @ other.lost)) or 1.0
+        bent = float(np.sign(self.bend @ other.bend)) or 1.0
+        return replace(
+            self, lost=turned * self.lost, inward=turned * self.inward, bend=bent * self.bend
+        )
 
 
 def analyse(robot: Robot, q: Array) -> Singularity:
@@ -166,11 +178,8 @@ def singular_postures(robot: Robot, margin: float, attempts: int = 24) -> Iterat
             q = make_singular(robot, seed)
         except DikbenchError:
             continue
-        limits = robot.limits.at(q)
-        if limits.to_lower is not None and limits.to_upper is not None:
-            if min(limits.to_lower.min(), limits.to_upper.min()) < margin:
-                continue
-        yield q
+        if position_margin(robot, q) >= margin:
+            yield q
 
 
 def _jacobian_derivatives(robot: Robot, q: Array) -> Array:

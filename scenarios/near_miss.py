@@ -12,15 +12,28 @@ import pinocchio as pin
 from dikbench.array import Array
 from dikbench.certificate import Certificate, Claim
 from dikbench.errors import DikbenchError
-from dikbench.oracle import OracleMotion, oracle_motion, solve_placement
+from dikbench.oracle import OracleMotion, joint_oracle, oracle_motion, solve_placement
 from dikbench.references import Reference, screw_path
 from dikbench.robot import Robot
 from dikbench.robot_catalogue import load_robot
 from dikbench.scenario import Scenario
-from dikbench.singularity import Kind, Singularity, analyse, make_singular, singular_postures
+from dikbench.singularity import (
+    Kind,
+    Singularity,
+    analyse,
+    make_singular,
+    singular_postures,
+)
 from dikbench.tasks import PoseTask
 from dikbench.variation import Perturbation, Variation
-from scenarios.common import between, limits_in_force, positive, secondary_tasks, start_velocity
+from scenarios.common import (
+    between,
+    limits_in_force,
+    placement_of,
+    positive,
+    secondary_tasks,
+    start_velocity,
+)
 from scenarios.singular_postures import SINGULAR_POSTURES, SingularityName, SingularPosture
 
 ROBOTS = tuple(SINGULAR_POSTURES)
@@ -92,13 +105,18 @@ def near_miss(
     arm = limits_in_force(load_robot(robot, frame), acceleration=acceleration)
     change = VARIATION.drawn(seed)
     pace = speed / change.pace
-    if singularity == "auto" and arm.name not in SINGULAR_POSTURES:
+    if arm.nv < len(arm.task_rows):
+        raise DikbenchError(
+            f"scenario near-miss: robot {arm.name} has {arm.nv} joints, a pose has "
+            f"{len(arm.task_rows)} rows: it is singular everywhere"
+        )
+    if singularity == "auto" and robot not in SINGULAR_POSTURES:
         passage = _first_found(arm, miss, pace, change)
     else:
-        known = _known(arm, singularity)
+        known = _known(robot, singularity)
         seeded = pin.integrate(arm.model, pin.neutral(arm.model), np.array(known.posture))
-        q_s = make_singular(arm, change.posture(arm, seeded))
-        passage = _passage(arm, analyse(arm, q_s), miss, pace, known.half_length)
+        where = _perturbed(arm, make_singular(arm, seeded), change)
+        passage = _passage(arm, where, miss, pace, known.half_length)
     reference, motion = passage.reference, passage.motion
     q0 = motion.q[0]
     return Scenario(
@@ -124,26 +142,34 @@ class _Passage(NamedTuple):
     certificate: Certificate
 
 
-def _known(arm: Robot, singularity: SingularityName | Literal["auto"]) -> SingularPosture:
+def _known(robot: str, singularity: SingularityName | Literal["auto"]) -> SingularPosture:
     """The posture of a name; of `auto`, the robot's first."""
-    postures = SINGULAR_POSTURES.get(arm.name, {})
+    postures = SINGULAR_POSTURES.get(robot, {})
     if singularity == "auto":
         return next(iter(postures.values()))
     if singularity not in postures:
         valid = ", ".join(["auto", *postures])
         raise DikbenchError(
-            f"scenario near-miss: no {singularity} of robot {arm.name} is known; "
+            f"scenario near-miss: no {singularity} of robot {robot} is known; "
             f"valid: singularity={valid}"
         )
     return postures[singularity]
 
 
+def _perturbed(arm: Robot, q: Array, change: Perturbation) -> Singularity:
+    """The singularity next to a singular posture (nq,), moved as the seed says, passed alike."""
+    nominal, moved = analyse(arm, q), change.posture(arm, q)
+    if moved is q:
+        return nominal
+    return analyse(arm, make_singular(arm, moved)).oriented_like(nominal)
+
+
 def _first_found(arm: Robot, miss: float, speed: float, change: Perturbation) -> _Passage:
     """Past the first singular posture, from the robot's start outwards, that certifies."""
     reason = "none is inside the position limits"
-    for q in singular_postures(arm, 4 * MARGIN):
+    for q in singular_postures(arm, 2 * MARGIN):
         try:
-            where = analyse(arm, make_singular(arm, change.posture(arm, q)))
+            where = _perturbed(arm, q, change)
         except DikbenchError:  # two singularities in one
             continue
         for half_length in HALF_LENGTHS[where.kind]:
@@ -169,6 +195,8 @@ def _passage(
         between("near-miss", "miss", miss, low, high)
     if where.kind == "crossing" and where.growth.max() < LEAST_GROWTH:
         raise DikbenchError("scenario near-miss: no single joint leads out of the singularity")
+    if where.kind == "crossing" and miss == 0:
+        return _straight_through(arm, where, speed, half_length)
     ways = _crossings if where.kind == "crossing" else _folds
     found: list[_Passage] = []
     reason = ""
@@ -188,13 +216,30 @@ def _passage(
     return max(found, key=lambda passage: float(passage.motion.margin.min()))
 
 
+def _straight_through(arm: Robot, where: Singularity, speed: float, half_length: float) -> _Passage:
+    """The motion of the single joint that leads out fastest, from one side to the other."""
+    reference, start = next(_crossings(arm, where, 0.0, speed, half_length))
+    out = _way_out(where)
+    motion = joint_oracle(
+        arm,
+        lambda tau: pin.integrate(arm.model, start, speed * tau * out),
+        _instants(half_length, 0.0, reference.duration),
+    )
+    return _Passage(reference, motion, _certificate(arm, where, 0.0, speed, motion))
+
+
+def _way_out(where: Singularity) -> Array:
+    """The unit velocity (nv,) of the joint that makes the smallest singular value grow fastest."""
+    out = np.zeros(len(where.growth))
+    out[np.argmax(where.growth)] = 1.0
+    return out
+
+
 def _crossings(
     arm: Robot, where: Singularity, miss: float, speed: float, half_length: float
 ) -> Iterator[tuple[Reference, Array]]:
     """Paths along the joint that leads out fastest, on either side, and seeds of their starts."""
-    out = np.zeros(arm.nv)
-    out[np.argmax(where.growth)] = 1.0
-    twist = np.zeros(6)
+    out, twist = _way_out(where), np.zeros(6)
     twist[list(arm.task_rows)] = where.jacobian @ out
     seed = pin.integrate(arm.model, where.q, -half_length * out)
     for side in (1.0, -1.0):
@@ -237,9 +282,12 @@ def _certificate(
     arm: Robot, where: Singularity, miss: float, speed: float, motion: OracleMotion
 ) -> Certificate:
     sigma, limit = motion.sigma_min, arm.limits.velocity
-    peak = float(np.abs(motion.v).max())
+    peak, middle = float(np.abs(motion.v).max()), motion.instants[SAMPLES]
+    aside = abs(motion.instants[np.argmin(sigma)] - middle) / middle
+    near = 0.3 + (2 * miss / (speed * middle) if where.kind == "crossing" else 0.0)
     claims = [
         Claim("smallest singular value on the path (m, rad)", sigma.min(), at_most=0.17),
+        Claim("where, from the nearest point (0) to the ends (1)", float(aside), at_most=near),
         Claim("its ratio to the largest one", sigma.min() / sigma.max(), at_most=0.7),
         Claim("smallest singular value at the start (m, rad)", sigma[0], at_least=0.02),
         Claim("position margin on the path [rad]", motion.margin.min(), at_least=MARGIN),
@@ -249,10 +297,17 @@ def _certificate(
         expected = speed / np.sqrt(2 * where.curvature * miss) * float(np.abs(where.bend).max())
         claims.append(Claim("peak joint speed [rad/s]", peak, at_least=0.5 * expected))
     elif miss > 0:
-        least = 0.5 * float(where.growth.max()) * speed / miss
+        least = 0.8 * float(where.growth.max()) * speed / miss
         claims.append(Claim("peak joint speed [rad/s]", peak, at_least=least))
     else:
         claims.append(Claim("peak joint speed [rad/s]", peak, at_most=1.2 * speed))
+    apart = _distance_from(where, motion.q[SAMPLES], arm)
+    claims.append(Claim("distance from the singular placement (m, rad)", apart, at_most=0.21))
     if limit is not None:
         claims.append(Claim("required speed over limit", motion.peak_speed_ratio))
     return Certificate(tuple(claims))
+
+
+def _distance_from(where: Singularity, q: Array, arm: Robot) -> float:
+    """Length (m, rad) of the twist from the singular placement to that of a configuration."""
+    return float(np.linalg.norm(pin.log6(where.placement.actInv(placement_of(arm, q))).np))

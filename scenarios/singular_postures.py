@@ -53,7 +53,7 @@ SINGULAR_POSTURES: Mapping[str, Mapping[SingularityName, SingularPosture]] = Map
         "kinova": {
             "wrist": SingularPosture((0.0, 2.9, 1.3, -2.07, pi, 0.0), 0.3),
             "elbow": SingularPosture((1.13, 3.56, pi, -1.45, 1.63, 1.0), 0.1),
-            "shoulder": SingularPosture((-0.36, 1.84, 0.85, -1.32, 1.86, 1.12), 0.1),
+            "shoulder": SingularPosture((0.03, 2.25, 0.66, -1.15, 1.88, 0.09), 0.1),
         },
         "tiago": {
             "wrist": SingularPosture((1.4, -0.4, -1.2, 1.47, 0.0, 0.0, 0.5), 0.1),

@@ -43,9 +43,10 @@ def test_lists_become_a_product_in_order() -> None:
 values = st.text("abc0123.-", min_size=1, max_size=4)
 
 
-@given(
-    lists=st.lists(st.lists(values, min_size=1, max_size=3, unique=True), min_size=1, max_size=3)
-)
+options_of_one = st.lists(values, min_size=1, max_size=3, unique=True)
+
+
+@given(lists=st.lists(options_of_one, min_size=1, max_size=3))
 def test_the_product_is_complete_and_each_selector_has_one_value(lists: list[list[str]]) -> None:
     """As many as the lists' lengths make, all different, each parses to one value per list."""
     inside = ",".join(f"p{n}={'|'.join(options)}" for n, options in enumerate(lists))

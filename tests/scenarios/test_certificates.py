@@ -26,11 +26,14 @@ from dikbench.tasks import PostureTask
 from formulations.pseudo_inverse import PseudoInverse
 from scenarios import SCENARIOS
 from scenarios.joint_limit_crossing import CROSSINGS
-from scenarios.near_miss import SINGULARITIES
+from scenarios.singular_postures import SINGULAR_POSTURES
 
 # What a robot needs beside its name, and variants that are cases of their own.
 EXTRA = {
-    ("near-miss", "panda"): ["singularity=elbow", "singularity=elbow,miss=0.005"],
+    **{
+        ("near-miss", robot): [f"singularity={name}" for name in postures]
+        for robot, postures in SINGULAR_POSTURES.items()
+    },
     ("near-miss", "ur5"): ["", "miss=0", "miss=0.005", "miss=0.2,speed=0.1"],
     ("joint-limit-crossing", "panda"): ["", "acceleration=true"],
     ("speed-sweep", "panda"): ["speed=0.3", "speed=1.3", "speed=2"],
@@ -183,41 +186,7 @@ def test_seed_zero_of_a_limit_crossing_has_the_tables_posture(robot: str) -> Non
         assert position.upper[where.joint] - q0[where.joint] == pytest.approx(0.25)
 
 
-@pytest.mark.parametrize(("robot", "singularity"), SINGULARITIES)
-def test_seed_zero_of_a_near_miss_passes_the_tables_singularity(
-    robot: str, singularity: str
-) -> None:
-    """The middle of the path is `miss` away from the placement of the posture in the table."""
-    miss = 0.05
-    scenario = make_scenario(f"near-miss[robot={robot},singularity={singularity},miss={miss}]")
-    q_s = np.array(SINGULARITIES[robot, singularity].posture)
-    middle = scenario.reference.placement(scenario.reference.duration / 2)
-    assert _distance(_placement(scenario.robot, q_s), middle) == pytest.approx(miss, rel=1e-9)
-    other = make_scenario(f"near-miss[robot={robot},singularity={singularity},miss={miss}]", 1)
-    assert _distance(other.reference.placement(other.reference.duration / 2), middle) > 1e-3
-
-
 # --- what makes each family what it is
-
-
-@pytest.mark.parametrize(("robot", "singularity"), SINGULARITIES)
-def test_a_nearer_miss_asks_for_more(robot: str, singularity: str) -> None:
-    """The smallest singular value on the path falls and the speed that it asks for grows."""
-    sigma, ratio = [], []
-    for miss in (0.1, 0.05, 0.02, 0.01):
-        text = f"near-miss[robot={robot},singularity={singularity},miss={miss}]"
-        claims = {c.quantity.partition(" ")[0]: c.value for c in _claims(text)}
-        sigma.append(claims["smallest"])
-        ratio.append(claims["required"])
-    assert sigma == sorted(sigma, reverse=True)
-    assert ratio == sorted(ratio)
-    # As 1/miss at a crossing, as 1/sqrt(miss) at a fold.
-    power = 1.0 if SINGULARITIES[robot, singularity].kind == "crossing" else 0.5
-    assert np.log(ratio[-1] / ratio[0]) / np.log(10) == pytest.approx(power, abs=0.15)
-
-
-def _claims(selector: str) -> tuple[Claim, ...]:
-    return make_scenario(selector).certificate.claims
 
 
 @pytest.mark.parametrize("speed", [0.3, 1.0, 1.3])
@@ -321,10 +290,6 @@ def test_redundant_arms_hold_a_posture_and_others_have_no_second_task(selector: 
         ("near-miss[miss=nan]", ["miss=nan must be between"]),
         ("near-miss[speed=0]", ["speed=0.0 must be between"]),
         ("near-miss[dt=-0.01]", ["dt=-0.01 must be positive"]),
-        (
-            "near-miss[robot=panda,singularity=elbow,miss=0]",
-            ["miss=0.0 must be between 0.002 and"],  # a fold cannot be touched
-        ),
         ("speed-sweep[radius=0.5]", ["radius=0.5 must be between 0.02 and 0.15"]),
         ("joint-limit-crossing[depth=0]", ["depth=0.0 must be between 0.02 and 0.5"]),
         ("joint-limit-crossing[approach=1e9]", ["joint-limit-crossing", "approach=1"]),
@@ -342,17 +307,6 @@ def test_impossible_scenarios_are_errors_of_one_line(selector: str, parts: list[
     assert "\n" not in message
     for part in parts:
         assert part in message
-
-
-@pytest.mark.parametrize(
-    "parameters", ["robot=panda", "robot=ur5,singularity=elbow", "singularity=elbow"]
-)
-def test_a_singularity_that_a_robot_has_not_lists_the_valid_pairs(parameters: str) -> None:
-    """Every pair of the table, in the form in which it can be asked for."""
-    with pytest.raises(DikbenchError) as caught:
-        make_scenario(f"near-miss[{parameters}]")
-    for robot, singularity in SINGULARITIES:
-        assert f"robot={robot},singularity={singularity}" in str(caught.value)
 
 
 def test_a_limit_that_cannot_be_reached_fails_loudly(monkeypatch: pytest.MonkeyPatch) -> None:
