@@ -2,7 +2,7 @@
 PYTHON ?= .venv/bin/python
 
 help:            ## this list
-	@grep -E '^[a-z-]+: ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 18
+	@grep -E '^[a-z-]+: ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 24
 
 setup:           ## environment with the tested versions
 	python3 -m venv .venv && .venv/bin/pip install -c constraints.txt -e ".[test]"
@@ -28,7 +28,10 @@ quick:           ## the default study
 benchmark:       ## how fast the harness is, against its peers (let nothing else run)
 	$(PYTHON) -m pip install --quiet -e ".[peers,drake]" && $(PYTHON) tests/benchmarks/ratios.py
 
+benchmark-scenarios:  ## how long each scenario takes to build
+	$(PYTHON) tests/benchmarks/scenario_building.py
+
 constraints:     ## the installed versions become the tested ones
 	.venv/bin/pip freeze --exclude-editable --exclude pip --exclude setuptools > constraints.txt
 
-.PHONY: help setup test test-long lint format contract quick benchmark constraints
+.PHONY: help setup test test-long lint format contract quick benchmark benchmark-scenarios constraints

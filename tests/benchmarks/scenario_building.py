@@ -1,0 +1,60 @@
+"""How long a scenario takes to build, certificate included: every family on every robot it lists.
+
+    python tests/benchmarks/scenario_building.py
+
+Prints the median of five builds each, the slowest first, once the robot is loaded; and how long the
+first build in a process takes, with the robot.
+"""
+
+from __future__ import annotations
+
+import sys
+import typing
+from statistics import median
+from time import perf_counter
+
+from dikbench.errors import DikbenchError
+from dikbench.registry import Plugin, make_scenario, plugins
+
+BUILDS = 5
+
+
+def robots_of(family: Plugin) -> tuple[str, ...]:
+    """The robots that a family lists, in its type or in its module."""
+    hint = typing.get_type_hints(family.documented)["robot"]
+    if typing.get_origin(hint) is typing.Literal:
+        return typing.get_args(hint)
+    listed: tuple[str, ...] = sys.modules[family.build.__module__].ROBOTS
+    return listed
+
+
+def build(selector: str) -> float:
+    """Seconds that a build takes."""
+    start = perf_counter()
+    make_scenario(selector)
+    return perf_counter() - start
+
+
+def main() -> None:
+    """Print the table."""
+    rows = []
+    for name, family in plugins("scenario").items():
+        required = [p for p in family.parameters.values() if p.default is p.empty]
+        if required:
+            print(f"{name}: not timed, {required[0].name} must be given")
+            continue
+        for robot in robots_of(family):
+            for more in ("", ",dt=0.001"):
+                selector = f"{name}[robot={robot}{more}]"
+                try:
+                    first = build(selector)
+                    rows.append((median(build(selector) for _ in range(BUILDS)), first, selector))
+                except DikbenchError as error:
+                    print(f"{selector}: {error}")
+    print(f"{'median [ms]':>12} {'first [ms]':>12}")
+    for again, first, selector in sorted(rows, reverse=True):
+        print(f"{1e3 * again:12.1f} {1e3 * first:12.1f}  {selector}")
+
+
+if __name__ == "__main__":
+    main()
