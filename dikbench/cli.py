@@ -259,9 +259,10 @@ def show(name: str, figure: Path | None) -> None:
     """
     from dikbench.listing import description
 
-    click.echo(description(name))
+    text = description(name)
     if figure is not None:
         from dikbench.report.scenario_figure import draw_scenario
 
         draw_scenario(name, figure)
-        click.echo(f"\n{figure}")
+        text += f"\n\n{figure}"
+    click.echo(text)

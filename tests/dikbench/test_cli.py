@@ -12,6 +12,10 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from dikbench.listing import listing
+from dikbench.metrics import METRICS
+from dikbench.registry import plugins
+
 LAW = '''
 from __future__ import annotations
 from dataclasses import dataclass
@@ -71,7 +75,13 @@ def test_help_does_not_import_anything_heavy() -> None:
         (("run", "--formulation", "nofile.py:Law"), ("nofile.py",)),
         (("run", "--solver", "osqp[eps=1]"), ("eps", "eps_abs")),
         (("run", "--scenario", "reach[robot=bad.urdf,frame=tip]"), ("bad.urdf", "URDF")),
-        (("run", "--scenario", "near-miss[robot=ur5,singularity=elbow]"), ("elbow", "wrist")),
+        (("run", "--scenario", "near-miss[robot=talos,singularity=wrist]"), ("wrist", "elbow")),
+        (("run", "--scenario", "reach[gain=1||2]"), ("gain", "empty")),
+        (("run", "--plant", "ideal[delay=-1]"), ("delay=-1", "0 to")),
+        (("run", "train", "--seed", "0"), ("seed 0", "1 to 99")),
+        (("show", "near-miss", "--figure", "a.gif"), ("a.gif", ".svg, .png, .pdf")),
+        (("show", "near-miss", "--figure", "no/such/a.png"), ("no/such/a.png", "No such file")),
+        (("show", "dls", "--figure", "a.png"), ("dls", "near-miss")),
         (("run", "--scenario", "reach[duration=1e15]"), ("steps", "valid")),
         (("run", "--plant", "perfect"), ("perfect", "ideal")),
         (("run", "--reference", "space"), ("space", "path")),
@@ -296,3 +306,39 @@ def _processes_in(folder: Path) -> list[str]:
         except OSError:  # gone, or not ours
             continue
     return found
+
+
+@pytest.mark.parametrize("ending", ["svg", "png", "pdf"])
+def test_a_scenario_is_shown_with_its_certificate_and_its_picture(
+    tmp_path: Path, ending: str
+) -> None:
+    """The claims, what the motion asks for, what a seed perturbs; and a figure of its kind."""
+    name = f"picture.{ending}"
+    done = dikbench("show", "near-miss[robot=panda,miss=0.01]", "--figure", name, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    for part in (
+        "Certificate of near-miss[robot=panda,miss=0.01]:",
+        "smallest singular value (m, rad): ",
+        "margin to the position limits [rad]: ",
+        "required speed over limit: up to ",
+        "reach from the first joint [m]: ",
+        "A seed perturbs: start by up to 0.1 rad per joint, timing by up to 10 %.",
+        name,
+    ):
+        assert part in done.stdout
+    content = (tmp_path / name).read_bytes()
+    begins = {"svg": b"<?xml", "png": bytes.fromhex("89504e470d0a1a0a"), "pdf": b"%PDF"}
+    assert content.startswith(begins[ending])
+    assert len(content) > 5000
+
+
+def test_every_listed_scenario_says_what_it_provokes_and_which_metric_shows_it() -> None:
+    """One line each, and the metrics are there."""
+    for family in plugins("scenario").values():
+        assert family.paragraph("Provokes"), family.name
+        shown = [name.strip() for name in family.paragraph("Shows in").split(",")]
+        assert shown
+        assert set(shown) <= set(METRICS), family.name
+    lines = listing("scenarios")
+    assert len(lines) == len(plugins("scenario"))
+    assert any("near a singularity" in line and "velocity_peak_ratio" in line for line in lines)
