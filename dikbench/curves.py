@@ -98,7 +98,8 @@ def _curve(
     turn: float,
 ) -> Reference:
     """A curve given by its offset from `start` at an angle, (2,) [m], and the derivative of it."""
-    first, origin = start.rotation.copy(), start.translation.copy()
+    first: Array = start.rotation.copy()
+    origin = start.translation.copy()
     normal = np.cross(plane[:, 0], plane[:, 1])
     rate = 2 * np.pi / period
 
