@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from dikbench.scenario import Scenario
+from scenarios.hexagon import hexagon
 from scenarios.joint_limit_crossing import joint_limit_crossing
 from scenarios.near_miss import near_miss
 from scenarios.reach import reach
@@ -20,5 +21,6 @@ SCENARIOS: Mapping[str, Callable[..., Scenario]] = MappingProxyType(
         "near-miss": near_miss,
         "joint-limit-crossing": joint_limit_crossing,
         "speed-sweep": speed_sweep,
+        "hexagon": hexagon,
     }
 )
