@@ -14,6 +14,7 @@ from scenarios.joint_limit_crossing import joint_limit_crossing
 from scenarios.near_miss import near_miss
 from scenarios.reach import reach
 from scenarios.speed_sweep import speed_sweep
+from scenarios.workspace_boundary import workspace_boundary
 
 SCENARIOS: Mapping[str, Callable[..., Scenario]] = MappingProxyType(
     {
@@ -22,5 +23,6 @@ SCENARIOS: Mapping[str, Callable[..., Scenario]] = MappingProxyType(
         "joint-limit-crossing": joint_limit_crossing,
         "speed-sweep": speed_sweep,
         "hexagon": hexagon,
+        "workspace-boundary": workspace_boundary,
     }
 )
