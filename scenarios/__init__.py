@@ -12,6 +12,7 @@ from dikbench.scenario import Scenario
 from scenarios.hexagon import hexagon
 from scenarios.joint_limit_crossing import joint_limit_crossing
 from scenarios.near_miss import near_miss
+from scenarios.pick_and_place import pick_and_place
 from scenarios.reach import reach
 from scenarios.speed_sweep import speed_sweep
 from scenarios.workspace_boundary import workspace_boundary
@@ -24,5 +25,6 @@ SCENARIOS: Mapping[str, Callable[..., Scenario]] = MappingProxyType(
         "speed-sweep": speed_sweep,
         "hexagon": hexagon,
         "workspace-boundary": workspace_boundary,
+        "pick-and-place": pick_and_place,
     }
 )
