@@ -15,11 +15,13 @@ from scenarios.near_miss import near_miss
 from scenarios.pick_and_place import pick_and_place
 from scenarios.reach import reach
 from scenarios.speed_sweep import speed_sweep
+from scenarios.step import step
 from scenarios.workspace_boundary import workspace_boundary
 
 SCENARIOS: Mapping[str, Callable[..., Scenario]] = MappingProxyType(
     {
         "reach": reach,
+        "step": step,
         "near-miss": near_miss,
         "joint-limit-crossing": joint_limit_crossing,
         "speed-sweep": speed_sweep,
