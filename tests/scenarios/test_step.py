@@ -59,7 +59,7 @@ def test_the_target_can_be_held_inside_the_limits_from_any_start(robot: str) -> 
 
 @pytest.mark.parametrize("robot", DIRECTIONS)
 def test_the_first_command_is_too_fast(robot: str) -> None:
-    """The gain times J^+ e at the start exceeds a velocity limit, and is what the certificate states."""
+    """The gain times J^+ e exceeds a velocity limit, and is what the certificate states."""
     scenario = make_scenario(f"step[robot={robot}]")
     arm, start = scenario.robot, _start(scenario)
     velocity = arm.limits.velocity
