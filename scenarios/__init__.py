@@ -10,6 +10,7 @@ from types import MappingProxyType
 
 from dikbench.scenario import Scenario
 from scenarios.hexagon import hexagon
+from scenarios.hold_still import hold_still
 from scenarios.joint_limit_crossing import joint_limit_crossing
 from scenarios.near_miss import near_miss
 from scenarios.pick_and_place import pick_and_place
@@ -22,6 +23,7 @@ SCENARIOS: Mapping[str, Callable[..., Scenario]] = MappingProxyType(
     {
         "reach": reach,
         "step": step,
+        "hold-still": hold_still,
         "near-miss": near_miss,
         "joint-limit-crossing": joint_limit_crossing,
         "speed-sweep": speed_sweep,
