@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from dikbench.scenario import Scenario
+from scenarios.back_and_forth import back_and_forth
 from scenarios.hexagon import hexagon
 from scenarios.hold_still import hold_still
 from scenarios.joint_limit_crossing import joint_limit_crossing
@@ -30,5 +31,6 @@ SCENARIOS: Mapping[str, Callable[..., Scenario]] = MappingProxyType(
         "hexagon": hexagon,
         "workspace-boundary": workspace_boundary,
         "pick-and-place": pick_and_place,
+        "back-and-forth": back_and_forth,
     }
 )
