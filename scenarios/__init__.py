@@ -10,6 +10,7 @@ from types import MappingProxyType
 
 from dikbench.scenario import Scenario
 from scenarios.back_and_forth import back_and_forth
+from scenarios.csv_poses import csv_poses
 from scenarios.hexagon import hexagon
 from scenarios.hold_still import hold_still
 from scenarios.joint_limit_crossing import joint_limit_crossing
@@ -32,5 +33,6 @@ SCENARIOS: Mapping[str, Callable[..., Scenario]] = MappingProxyType(
         "workspace-boundary": workspace_boundary,
         "pick-and-place": pick_and_place,
         "back-and-forth": back_and_forth,
+        "csv": csv_poses,
     }
 )
