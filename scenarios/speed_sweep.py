@@ -98,8 +98,8 @@ def speed_sweep(
                 at_least=0.95 * speed,
                 at_most=1.05 * speed,
             ),
-            Claim("smallest singular value (m, rad)", motion.sigma_min.min(), at_least=0.05),
-            Claim("position margin [rad]", motion.margin.min(), at_least=0.05),
+            Claim("smallest singular value (m, rad)", motion.sigma_min.min(), at_least=0.04),
+            Claim("position margin [rad]", motion.margin.min(), at_least=0.02),
         )
     )
     return Scenario(
