@@ -71,27 +71,3 @@ def joint_path(
         return V
 
     return Reference(duration, placement, twist)
-
-
-def circle(start: Any, radius: float, period: float, laps: float) -> Reference:
-    """A circle in the world's y-z plane through `start`, orientation fixed.
-
-    Args:
-        start: placement at tau = 0, the lowest point of the circle.
-        radius: [m].
-        period: nominal time of a lap [s].
-        laps: number of laps.
-    """
-    rotation = start.rotation.copy()
-    centre = start.translation + np.array([0.0, 0.0, radius])
-    rate = 2 * np.pi / period
-
-    def placement(tau: float) -> Any:
-        offset = np.array([0.0, np.sin(rate * tau), -np.cos(rate * tau)])
-        return pin.SE3(rotation, centre + radius * offset)
-
-    def velocity(tau: float) -> Array:
-        world = radius * rate * np.array([0.0, np.cos(rate * tau), np.sin(rate * tau)])
-        return np.concatenate([rotation.T @ world, np.zeros(3)])
-
-    return Reference(laps * period, placement, velocity)

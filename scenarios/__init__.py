@@ -9,16 +9,30 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from dikbench.scenario import Scenario
+from scenarios.back_and_forth import back_and_forth
+from scenarios.csv_poses import csv_poses
+from scenarios.hexagon import hexagon
+from scenarios.hold_still import hold_still
 from scenarios.joint_limit_crossing import joint_limit_crossing
 from scenarios.near_miss import near_miss
+from scenarios.pick_and_place import pick_and_place
 from scenarios.reach import reach
 from scenarios.speed_sweep import speed_sweep
+from scenarios.step import step
+from scenarios.workspace_boundary import workspace_boundary
 
 SCENARIOS: Mapping[str, Callable[..., Scenario]] = MappingProxyType(
     {
         "reach": reach,
+        "step": step,
+        "hold-still": hold_still,
         "near-miss": near_miss,
         "joint-limit-crossing": joint_limit_crossing,
         "speed-sweep": speed_sweep,
+        "hexagon": hexagon,
+        "workspace-boundary": workspace_boundary,
+        "pick-and-place": pick_and_place,
+        "back-and-forth": back_and_forth,
+        "csv": csv_poses,
     }
 )

@@ -8,7 +8,7 @@ import pinocchio as pin
 from dikbench.array import Array
 from dikbench.errors import DikbenchError
 from dikbench.kinematics import Kinematics
-from dikbench.oracle import POSE
+from dikbench.oracle import POSE, oracle_motion
 from dikbench.references import Reference
 from dikbench.robot import Robot
 from dikbench.steps import steps_in
@@ -84,6 +84,19 @@ def placement_of(robot: Robot, q: Array) -> pin.SE3:
     kinematics = Kinematics(robot)
     kinematics.update(q)
     return kinematics.placement(robot.frame_id).copy()
+
+
+def duration_at(robot: Robot, at_one_second: Reference, q0: Array, speed: float) -> float:
+    """How long a motion takes [s] whose exact joint motion peaks at `speed` times the limits.
+
+    Args:
+        robot: the robot, with velocity limits in force.
+        at_one_second: the motion, done in one second: joint speeds go with 1/duration.
+        q0: configuration at its beginning, (nq,).
+        speed: peak of the joint speeds over their limits.
+    """
+    motion = oracle_motion(robot, at_one_second, q0, np.linspace(0.0, 1.0, 201))
+    return motion.peak_speed_ratio / speed
 
 
 def samples(duration: float, dt: float, most: int = 200) -> Array:

@@ -28,11 +28,11 @@ import numpy as np
 import pinocchio as pin
 from peer_ticks import bare_dls_tick, drake_tick, mink_tick, pink_tick
 
+from dikbench.curves import circle
 from dikbench.limits import JointLimits
 from dikbench.planar_arm import planar_arm
 from dikbench.plants import Plant
 from dikbench.problem import DikProblem, program_of
-from dikbench.references import circle
 from dikbench.registry import make_formulation, make_scenario
 from dikbench.robot import Robot, model_limits
 from dikbench.run.timing import record_problems

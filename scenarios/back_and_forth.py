@@ -1,0 +1,175 @@
+"""pink_bench's back and forth: a wide sweep of position and orientation, again and again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import pi
+from types import MappingProxyType
+from typing import Any, Literal
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.array import Array
+from dikbench.certificate import Certificate, Claim
+from dikbench.oracle import oracle_motion, solve_placement
+from dikbench.references import Reference
+from dikbench.robot_catalogue import load_robot
+from dikbench.scenario import Scenario
+from dikbench.tasks import PoseTask
+from dikbench.variation import Variation
+from scenarios.common import (
+    limits_in_force,
+    placement_of,
+    positive,
+    samples,
+    secondary_tasks,
+    start_velocity,
+)
+
+VARIATION = Variation(direction=0.2, timing=0.1)
+
+START = np.array([0.4, 0.8, 0.4])
+STOP = np.array([-0.4, 0.6, 0.6])
+DURATION = 10.0
+
+
+@dataclass(frozen=True)
+class SetUp:
+    """How a robot does it.
+
+    Attributes:
+        frame: its task frame.
+        scale: by which the path is made smaller.
+        roll: of the target orientation about x [rad].
+        near: a configuration near the start of the path [rad].
+        speed: least and largest peak of the joint motion over the limits.
+        sigma_min: smallest singular value on the path, at least (m, rad).
+    """
+
+    frame: str
+    scale: float
+    roll: float
+    near: tuple[float, ...]
+    speed: tuple[float, float]
+    sigma_min: float
+
+
+SET_UPS: Mapping[str, SetUp] = MappingProxyType(
+    {
+        "ur3": SetUp("ee_link", 0.5, 0, (0.87, -0.52, 1.37, 2.3, -1.65, 0), (0.5, 0.66), 0.1),
+        "ur5": SetUp("ee_link", 0.9, 0, (0.99, -0.66, 0.88, 2.93, -1.78, 0), (0.33, 0.44), 0.13),
+        "ur10": SetUp("ee_link", 1.0, 0, (0.94, -0.98, 1.65, 2.48, -1.72, 0), (0.48, 0.63), 0.3),
+        "panda": SetUp(
+            "panda_hand",
+            0.7,
+            pi / 2,
+            (1.28, 0.69, 0.03, -1.58, -1.23, 1.17, 1.56),
+            (0.38, 0.52),
+            0.14,
+        ),
+    }
+)
+
+
+def back_and_forth(
+    robot: Literal["ur3", "ur5", "ur10", "panda"] = "ur5",
+    *,
+    gain: float = 5.0,
+    dt: float = 0.005,
+    acceleration: bool = False,
+    seed: int = 0,
+) -> Scenario:
+    """A wide sweep of position and orientation, back and forth for 10 s: pink_bench's trajectory.
+
+        p = scale (start + (stop - start) sin^2 t),
+        R = Rz(pi/4 (1 + sin^2 t)) Rx(pi/4 sin^2 t) R_t
+
+    with start (0.4, 0.8, 0.4) m, stop (-0.4, 0.6, 0.6) m. UR3, UR5 and UR10 do it with the frame
+    `ee_link`, R_t = I and scale 0.5, 0.9, 1.0; the Panda with `panda_hand`, Rx(pi/2) and 0.7. The
+    original lets the arms go to the path from afar; here they start on it. A seed turns the whole
+    path about the vertical by up to 0.2 rad and changes its pace by up to 10 %.
+
+    Provokes: a wide and steady sweep, inside all limits
+
+    Shows in: position_error_rms_m, orientation_error_rms_rad
+
+    Args:
+        robot: ur3, ur5, ur10 or panda.
+        gain: of the tracking task, 1/s.
+        dt: control period [s].
+        acceleration: whether acceleration limits are in force.
+        seed: 0 perturbs nothing.
+
+    Source: pink_bench (Caron), back-and-forth trajectory.
+    """
+    positive("back-and-forth", gain=gain, dt=dt)
+    where, change = SET_UPS[robot], VARIATION.drawn(seed)
+    arm = limits_in_force(load_robot(robot, where.frame), acceleration=acceleration)
+    # A bend of the path about any other axis would lead out of reach.
+    yaw = float(pin.log3(change.rotation(arm))[2])
+    reference = _path(where, yaw, change.pace)
+    q0 = solve_placement(arm, reference.placement(0.0), np.array(where.near))
+    motion = oracle_motion(arm, reference, q0, samples(reference.duration, dt))
+    least, largest = where.speed
+    points = np.array([placement_of(arm, q).translation for q in motion.q[::4]])
+    sweep = np.linalg.norm(points - points[0], axis=1).max()
+    certificate = Certificate(
+        (
+            Claim("sweep from end to end [m]", sweep, at_least=0.83 * where.scale),
+            Claim(
+                "required speed over limit",
+                motion.speed_ratio.max(),
+                at_least=least / change.pace,
+                at_most=largest / change.pace,
+            ),
+            Claim(
+                "smallest singular value (m, rad)",
+                motion.sigma_min.min(),
+                at_least=0.9 * where.sigma_min,
+            ),
+            Claim("position margin [rad]", motion.margin.min(), at_least=0.5),
+        )
+    )
+    return Scenario(
+        robot=arm,
+        q0=q0,
+        v0=start_velocity(arm, reference, q0),
+        reference=reference,
+        tracking=PoseTask(gain=gain),
+        dt=dt,
+        duration=reference.duration,
+        certificate=certificate,
+        tasks=secondary_tasks(arm, q0),
+        motion=motion,
+        variation=VARIATION,
+    )
+
+
+def _path(where: SetUp, yaw: float, pace: float) -> Reference:
+    turned, target = pin.utils.rotate("z", yaw), pin.utils.rotate("x", where.roll)
+    first = turned @ (where.scale * START)
+    way = turned @ (where.scale * (STOP - START))
+    up, forward = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
+
+    def rotation(share: float) -> Array:
+        inclined: Array = pin.utils.rotate("z", yaw + pi / 4 * (1 + share)) @ pin.utils.rotate(
+            "x", pi / 4 * share
+        )
+        return inclined
+
+    def placement(tau: float) -> Any:
+        share = float(np.sin(tau / pace)) ** 2
+        return pin.SE3(rotation(share) @ target, first + share * way)
+
+    def velocity(tau: float) -> Array:
+        share = float(np.sin(tau / pace)) ** 2
+        rate = float(np.sin(2 * tau / pace)) / pace
+        inclined = rotation(share)
+        # Rz(a) Rx(b) turns at a' about the vertical and at b' about its own x.
+        world = np.array([way, pi / 4 * (up + inclined @ forward)])
+        twist: Array = rate * (world @ inclined @ target).ravel()
+        return twist
+
+    return Reference(pace * DURATION, placement, velocity)

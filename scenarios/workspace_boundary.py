@@ -1,0 +1,159 @@
+"""A straight line out of the arm's reach and back, or a target out of reach."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import pi
+from typing import Any, Literal
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.array import Array
+from dikbench.certificate import Certificate, Claim
+from dikbench.errors import DikbenchError
+from dikbench.oracle import OracleMotion, measure_motion, solve_placement
+from dikbench.references import Reference, target_at_rest
+from dikbench.robot import Robot
+from dikbench.robot_catalogue import load_robot
+from dikbench.scenario import Scenario
+from dikbench.tasks import PoseTask
+from dikbench.variation import Variation
+from scenarios.common import (
+    between,
+    limits_in_force,
+    placement_of,
+    positive,
+    secondary_tasks,
+    start_velocity,
+)
+
+ROBOTS = ("panda", "ur3", "ur5", "ur10", "xarm7", "kinova", "tiago", "planar3r", "planar4r")
+"""On which its defaults are certified; it takes any."""
+
+VARIATION = Variation(start=0.1)
+
+STRIDE = 0.02
+"""Step [m] by which the line is followed; halved where it leads too far."""
+
+RESOLUTION = 1e-4
+"""The reach is known to so much [m]."""
+
+FARTHEST_STEP = 0.6
+"""A solution that is further away than this [rad] belongs to another branch."""
+
+
+def workspace_boundary(
+    robot: str = "panda",
+    *,
+    frame: str | None = None,
+    path: Literal["out-and-back", "still"] = "out-and-back",
+    extent: float = 1.1,
+    speed: float = 0.3,
+    gain: float = 5.0,
+    dt: float = 0.01,
+    acceleration: bool = False,
+    seed: int = 0,
+) -> Scenario:
+    """A straight line from the start to `extent` times the reach and back, orientation held.
+
+    On the ray from the first joint's origin o through the start, at the distance r_0:
+    p(tau) = o + (r_0 + (extent reach - r_0) sin^2(pi tau/T)) u, or, where the path is `still`, the
+    farthest point from the first instant on, for 20/gain seconds. The reach is that along the ray,
+    measured by following it until no posture does, and ends in a singularity, not at a limit. A
+    seed moves the start by up to 0.1 rad per joint.
+
+    Provokes: a target that nothing can reach: chatter about a stretched arm, and the way back
+
+    Shows in: sigma_min, velocity_peak_ratio, stuck_share
+
+    Args:
+        robot: a robot's name, or the path of a URDF.
+        frame: its task frame; default: the robot's.
+        path: out-and-back or still.
+        extent: farthest point over the reach along the ray, 1 to 1.5.
+        speed: peak speed along the line [m/s], 0.05 to 2.
+        gain: of the tracking task, 1/s.
+        dt: control period [s].
+        acceleration: whether acceleration limits are in force.
+        seed: 0 perturbs nothing.
+
+    Source: Chiaverini, Siciliano & Egeland 1994 (the arm stretched at the boundary).
+    """
+    positive("workspace-boundary", gain=gain, dt=dt)
+    between("workspace-boundary", "extent", extent, 1.0, 1.5)
+    between("workspace-boundary", "speed", speed, 0.05, 2.0)
+    arm = limits_in_force(load_robot(robot, frame), acceleration=acceleration)
+    q0 = VARIATION.drawn(seed).posture(arm, arm.q0)
+    start = placement_of(arm, q0)
+    origin = arm.model.jointPlacements[1].translation
+    ray = start.translation - origin
+    first = float(np.linalg.norm(ray))
+    ray /= first
+
+    def at(distance: float) -> Any:
+        return pin.SE3(start.rotation, origin + distance * ray)
+
+    motion = _as_far_as_it_goes(arm, at, first, q0)
+    reach = float(motion.reach[-1])
+    farthest = extent * reach
+    if path == "still":
+        reference = target_at_rest(at(farthest), 20 / gain)
+    else:
+        reference = _out_and_back(at, start.rotation.T @ ray, first, farthest - first, speed)
+    asked = arm.reach_of(reference.placement(reference.duration / 2))
+    sigma = motion.sigma_min
+    certificate = Certificate(
+        (
+            Claim("reach along the line [m]", reach, at_least=1.05 * first),
+            Claim("farthest target over the reach", asked / reach, at_least=1 - 1e-9),
+            Claim("singular value at the boundary (m, rad)", sigma[-1], at_most=0.02),
+            Claim("its ratio to the one at the start", sigma[-1] / sigma[0], at_most=0.1),
+            Claim("position margin up to there [rad]", motion.margin.min(), at_least=0.02),
+        )
+    )
+    return Scenario(
+        robot=arm,
+        q0=q0,
+        v0=start_velocity(arm, reference, q0),
+        reference=reference,
+        tracking=PoseTask(gain=gain),
+        dt=dt,
+        duration=reference.duration,
+        certificate=certificate,
+        tasks=secondary_tasks(arm, q0),
+        variation=VARIATION,
+    )
+
+
+def _as_far_as_it_goes(
+    arm: Robot, at: Callable[[float], Any], first: float, q0: Array
+) -> OracleMotion:
+    """The motion along the placements at(distance) from `first` [m] on to the last one reached."""
+    q, distance, stride = [q0], first, STRIDE
+    while stride > RESOLUTION:
+        try:
+            further = solve_placement(arm, at(distance + stride), q[-1], iterations=30)
+        except DikbenchError:
+            stride /= 2
+            continue
+        if np.abs(pin.difference(arm.model, q[-1], further)).max() > FARTHEST_STEP:
+            stride /= 2
+            continue
+        q.append(further)
+        distance += stride
+    return measure_motion(arm, np.arange(len(q), dtype=float), np.array(q))
+
+
+def _out_and_back(
+    at: Callable[[float], Any], direction: Array, first: float, way: float, speed: float
+) -> Reference:
+    """From the distance `first` [m] along `direction` (in the frame's axes) by `way`, and back."""
+    duration = pi * way / speed
+    rate = pi / duration
+
+    def velocity(tau: float) -> Array:
+        along = way * rate * np.sin(2 * rate * tau)
+        return np.concatenate([along * direction, np.zeros(3)])
+
+    return Reference(duration, lambda tau: at(first + way * np.sin(rate * tau) ** 2), velocity)

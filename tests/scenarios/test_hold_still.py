@@ -1,0 +1,115 @@
+"""Holding still: nothing moves without noise; with it, what is near shows."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+
+from dikbench.errors import DikbenchError
+from dikbench.kinematics import Kinematics
+from dikbench.registry import make_scenario
+from dikbench.robot_catalogue import load_robot
+from scenarios.hold_still import POSTURES, Postures
+
+Metrics = Callable[..., dict[str, float]]
+
+NOISY = "ideal[noise=0.003]"
+
+
+@pytest.mark.parametrize("robot", POSTURES)
+@pytest.mark.parametrize("posture", ["start", "singular", "limit"])
+def test_it_stands_where_it_says_from_any_seed(robot: str, posture: str) -> None:
+    """Singular value and margin recomputed: one of them small, or neither; inside the limits."""
+    for seed in range(21):
+        scenario = make_scenario(f"hold-still[robot={robot},posture={posture}]", seed)
+        kinematics, position = Kinematics(scenario.robot), scenario.robot.limits.position
+        assert position is not None
+        kinematics.update(scenario.q0)
+        X = kinematics.placement(scenario.robot.frame_id)
+        assert X.homogeneous == pytest.approx(scenario.reference.placement(3.0).homogeneous)
+        J = kinematics.jacobian(scenario.robot.frame_id)
+        sigma = np.linalg.svd(J, compute_uv=False)[-1]
+        margin = np.minimum(position.upper - scenario.q0, scenario.q0 - position.lower).min()
+        assert (sigma < 0.002) == (posture == "singular")
+        assert sigma > 1e-4
+        assert (margin < 0.1) == (posture == "limit")
+        assert margin > 0.0029
+
+
+def test_a_wrist_this_near_is_singular_to_first_order() -> None:
+    """A UR's sigma_min is proportional to the wrist's angle: about 0.4 m/rad on a UR5."""
+    scenario = make_scenario("hold-still[robot=ur5,posture=singular]")
+    claims = {c.quantity.partition(" ")[0]: c.value for c in scenario.certificate.claims}
+    assert claims["smallest"] == pytest.approx(0.397 * 0.003, rel=0.02)
+
+
+@pytest.mark.parametrize("posture", ["start", "singular", "limit"])
+@pytest.mark.parametrize("law", ["pinv", "pinv[after=clip]", "dls", "nullspace", "qp", "lp-alpha"])
+def test_measured_exactly_no_law_moves(law: str, posture: str, metrics: Metrics) -> None:
+    """No joint by more than 1e-6 rad in 10 s."""
+    scenario = make_scenario(f"hold-still[posture={posture},dt=0.05]")
+    assert metrics(law, scenario)["joint_travel_rad"] < 1e-6
+
+
+def test_noise_next_to_a_singularity_makes_the_pseudo_inverse_jump(metrics: Metrics) -> None:
+    """Beyond the joints' limits on the UR5, where damping makes a hundredth of that."""
+    scenario = make_scenario("hold-still[robot=ur5,posture=singular]")
+    free, damped = (metrics(law, scenario, NOISY)["velocity_peak_ratio"] for law in ("pinv", "dls"))
+    assert free > 1
+    assert damped < 0.01 * free
+
+
+def test_noise_far_from_a_singularity_is_not_magnified(metrics: Metrics) -> None:
+    """It lies in the range of J: ||J^+ J dq|| <= ||dq||, whatever the posture, times the gain."""
+    scenario = make_scenario("hold-still[robot=ur5]")
+    velocity = scenario.robot.limits.velocity
+    assert velocity is not None
+    # Of 6000 normal numbers none is above 5.5 deviations; six of them make a norm.
+    most = 5.0 * 5.5 * 0.003 * np.sqrt(6) / velocity.upper.min()
+    assert metrics("pinv", scenario, NOISY)["velocity_peak_ratio"] < most
+
+
+def test_noise_next_to_a_limit_sends_laws_that_know_it_off_course(metrics: Metrics) -> None:
+    """The joint seems to be outside and is told to come back; a law without limits stays calm."""
+    scenario = make_scenario("hold-still[posture=limit]")
+    blind, knowing = metrics("pinv", scenario, NOISY), metrics("qp", scenario, NOISY)
+    assert blind["off_course_max_rad"] < 0.05
+    assert knowing["off_course_max_rad"] > 1
+    assert knowing["velocity_peak_ratio"] > 2 * blind["velocity_peak_ratio"]
+
+
+def test_postures_that_are_not_near_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A wrist half a radian from its singularity, and a limit that is out of reach."""
+    module = sys.modules["scenarios.hold_still"]
+    bent = Postures((0.3, -1.2, 1.4, -1.0, 0.5, 0.2), (4,), 0)
+    monkeypatch.setattr(module, "POSTURES", MappingProxyType({"ur5": bent}))
+    with pytest.raises(DikbenchError, match="smallest singular value"):
+        make_scenario("hold-still[robot=ur5,posture=singular]")
+    monkeypatch.setattr(module, "NEAR", 0.5)
+    with pytest.raises(DikbenchError, match="position margin"):
+        make_scenario("hold-still[robot=ur5,posture=limit]")
+    monkeypatch.setattr(
+        module, "load_robot", lambda name: load_robot(name).with_limits(position=None)
+    )
+    with pytest.raises(DikbenchError, match="robot ur5 has no limits"):
+        make_scenario("hold-still[robot=ur5,posture=limit]")
+
+
+@pytest.mark.parametrize(
+    ("selector", "words"),
+    [
+        ("hold-still[robot=talos]", "valid: panda, ur3, ur5, ur10"),
+        ("hold-still[posture=elbow]", "valid: start, singular, limit"),
+        ("hold-still[gain=0]", "gain=0.0 must be positive"),
+    ],
+)
+def test_errors_say_what_is_valid(selector: str, words: str) -> None:
+    """One line each."""
+    with pytest.raises(DikbenchError) as caught:
+        make_scenario(selector)
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
