@@ -14,6 +14,10 @@ from dikbench.linear_algebra import null_space
 from dikbench.problem import DikProblem, LimitKind, Solve
 from dikbench.quadratic_program import Program, QuadraticProgram
 
+UNIQUE = 1e-5
+"""Damping of the levels above the last: solvers are exact on strictly convex programs, and a task
+gives way by (1e-5/sigma)^2 of its velocity along a direction with the singular value sigma."""
+
 
 @dataclass(frozen=True)
 class HierarchicalQp:
@@ -24,10 +28,11 @@ class HierarchicalQp:
 
     over the priority levels k = 1, ..., K; J_k (m_k, nv) and V_k (m_k,) are level k's rows
     multiplied by the square roots of their weights, poses in the task frame; v in rad/s; lo and hi
-    the velocity box. The last level adds 1/2 lambda^2 ||v||^2. What the levels above have reached
-    is kept by moving in the null space of their rows, v = v_(k-1) + N z, so that no solver's
-    tolerance lets it go. With one level it is `qp`, with no bound active `nullspace`. Singular
-    where a task is, but inside the limits; leaves the course where a bound binds.
+    the velocity box. The last level adds 1/2 lambda^2 ||v||^2, the others do with lambda = 1e-5.
+    What the levels above have reached is kept by moving in the null space of their rows,
+    v = v_(k-1) + N z, so that no solver's tolerance lets it go. With one level it is `qp`, with no
+    bound active `nullspace`. Singular where a task is, but inside the limits; leaves the course
+    where a bound binds.
 
     Attributes:
         damping: lambda, unsquared, of the last level.
@@ -42,7 +47,7 @@ class HierarchicalQp:
     rank_tolerance: float = 1e-6
     braking: Braking = "viable"
 
-    program: ClassVar[Program] = "lp"
+    program: ClassVar[Program] = "qp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
 
     def __post_init__(self) -> None:
@@ -61,7 +66,7 @@ class HierarchicalQp:
             scale = np.sqrt(np.broadcast_to(level.weight, level.V.shape))
             A = scale[:, None] * level.J @ N
             last = number == len(levels) - 1
-            damping = self.damping if last else 0.0
+            damping = self.damping if last else UNIQUE
             z = solve(_level(A, scale * (level.V - level.J @ v), v, N, box, damping))
             v = v + N @ z
             if not last:
