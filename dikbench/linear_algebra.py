@@ -35,3 +35,13 @@ def solve_positive_definite(A: Array, b: Array) -> Array | None:
     """X with A x = b for a symmetric positive definite A (n, n); None where A is not."""
     _, x, info = dposv(A, b)
     return x if info == 0 else None
+
+
+def null_space(A: Array, tolerance: float) -> Array:
+    """An orthonormal basis of the null space of A (m, n), as columns (n, n - rank).
+
+    Singular values up to `tolerance` (absolute, in the units of A) are taken as zero.
+    """
+    _, singular, Vt, _ = dgesdd(A, full_matrices=1)
+    basis: Array = Vt[int(np.count_nonzero(singular > tolerance)) :].T
+    return basis

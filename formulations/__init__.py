@@ -9,11 +9,20 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from dikbench.problem import Formulation
+from formulations.alpha_two_stage import AlphaTwoStage
 from formulations.damped_least_squares import DampedLeastSquares
+from formulations.drake import Drake
+from formulations.drake_system import DrakeSystem
+from formulations.hierarchical_qp import HierarchicalQp
 from formulations.lp_alpha import LpAlpha
+from formulations.lp_alpha_components import LpAlphaComponents
 from formulations.lp_alpha_cvxpy import LpAlphaCvxpy
+from formulations.mink_qp import MinkQp
+from formulations.neo import Neo
 from formulations.nullspace import Nullspace
+from formulations.pink_qp import PinkQp
 from formulations.pseudo_inverse import PseudoInverse
+from formulations.qp_velocity import QpVelocity
 from formulations.weighted_qp import WeightedQp
 
 FORMULATIONS: Mapping[str, type[Formulation]] = MappingProxyType(
@@ -22,7 +31,16 @@ FORMULATIONS: Mapping[str, type[Formulation]] = MappingProxyType(
         "dls": DampedLeastSquares,
         "nullspace": Nullspace,
         "qp": WeightedQp,
+        "qp-velocity": QpVelocity,
+        "hqp": HierarchicalQp,
+        "pink-qp": PinkQp,
+        "mink-qp": MinkQp,
         "lp-alpha": LpAlpha,
+        "alpha-two-stage": AlphaTwoStage,
+        "drake": Drake,
+        "drake-system": DrakeSystem,
+        "neo": Neo,
+        "lp-alpha-components": LpAlphaComponents,
         "lp-alpha-cvxpy": LpAlphaCvxpy,
     }
 )

@@ -1,0 +1,78 @@
+"""Alpha scaling first, then the posture in what it leaves free."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from dikbench.array import Array
+from dikbench.box import Braking
+from dikbench.errors import DikbenchError
+from dikbench.linear_algebra import null_space
+from dikbench.problem import DikProblem, LimitKind, Solve
+from dikbench.quadratic_program import Program, QuadraticProgram
+from dikbench.tasks.posture import LinearizedPosture
+from formulations.lp_alpha import alpha_program
+
+
+@dataclass(frozen=True)
+class AlphaTwoStage:
+    """Alpha scaling in two stages: as far as the limits allow, then the posture, which cannot leak.
+
+        1.  alpha*, v_1 = argmax alpha   s.t.  J v = alpha V,  0 <= alpha <= 1,  lo <= v <= hi
+        2.  z* = argmin 1/2 ||v_1 + N z - v_2||^2   s.t.  lo <= v_1 + N z <= hi,   v = v_1 + N z*
+
+    J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s; N (nv, nv - rank J)
+    an orthonormal basis of the null space of J; v_2 = gain e the wanted velocity of the problem's
+    posture task, zero where there is none. lo and hi are the velocity box. Stage 2 moves in the
+    null space only: posed with J v = alpha* V as an equality, solvers find it infeasible by
+    rounding. What Drake's single weighted cost approximates. Never off course and inside every
+    limit; weights play no part.
+
+    Attributes:
+        rank_tolerance: singular values up to this count as zero (absolute, units of J).
+        braking: how the box approaches a position limit (see `dikbench.box`).
+
+    Source: our own; stage 1 is Tedrake's (Robotic Manipulation, ch. 3), stage 2 the lexicographic
+    order of Kanoun, Lamiraux & Wieber (2011).
+    """
+
+    rank_tolerance: float = 1e-6
+    braking: Braking = "viable"
+
+    program: ClassVar[Program] = "lp"
+    keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        if not 0 <= self.rank_tolerance < np.inf:
+            raise DikbenchError("alpha-two-stage: rank_tolerance must be finite and at least 0")
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        task, box = problem.primary, problem.box(self.braking)
+        n = problem.robot.nv
+        first = solve(alpha_program(task, box, 0.0))[:n]
+        N = null_space(task.J, self.rank_tolerance)
+        k = N.shape[1]
+        if not k:
+            return first
+        wanted = posture_velocity(problem)
+        # The first stage keeps the box to a solver's tolerance only: z = 0 stays feasible.
+        lower, upper = np.minimum(box.lower, first), np.maximum(box.upper, first)
+        G = np.vstack([N, -N])
+        h = np.concatenate([upper - first, first - lower])
+        bounded = np.isfinite(h)
+        z = solve(QuadraticProgram(np.eye(k), N.T @ (first - wanted), G=G[bounded], h=h[bounded]))
+        v: Array = first + N @ z
+        return v
+
+
+def posture_velocity(problem: DikProblem) -> Array:
+    """The wanted velocity of the problem's first posture task, (nv,) [rad/s]; else zero."""
+    for task in problem.tasks:
+        if isinstance(task, LinearizedPosture):
+            return task.V
+    return np.zeros(problem.robot.nv)

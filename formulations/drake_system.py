@@ -1,0 +1,86 @@
+"""Drake's system: least squares with centring inside velocity bounds that shrink near limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from dikbench.array import Array
+from dikbench.errors import DikbenchError
+from dikbench.limits import Limits
+from dikbench.problem import DikProblem, LimitKind, Solve
+from dikbench.quadratic_program import Program, QuadraticProgram
+from formulations.drake import angular_first, posture_error
+from formulations.lu_kernel import lu_kernel
+
+NEAR = 0.0025
+"""Distance [rad] to a limit from which on nothing moves towards it."""
+
+INFLUENCE = 0.1
+"""Distance [rad] from which a limit slows a joint down."""
+
+
+@dataclass(frozen=True)
+class DrakeSystem:
+    """Least squares and joint centring, as Drake's system of 2025 poses it; no alpha.
+
+        min_v  G ||J v - V||^2 + ||P (v - K e)||^2
+        s.t.   s_lo v_min <= v <= s_hi v_max,   s = clamp((d - 0.0025)/(0.1 - 0.0025), 0, 1)
+
+    J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s; e = q_nom - q is the
+    error of the problem's posture task, (nv,) (zero where there is none); P the kernel of J by a
+    full-pivoting LU, as in `drake`; d the distance to the nearer position limit [rad], whose side
+    alone is scaled. Keeps the velocity limits and, by the scaling, the position limits in motions
+    of ordinary speed; outside a limit a joint may stay where it is. Leaves the course where the
+    bounds bind. Weights play no part.
+
+    Attributes:
+        tracking_weight: G; Drake's own default is 1, its manual advises 100.
+        centering: K [1/s].
+
+    Source: Drake 1.51, DifferentialInverseKinematicsSystem (its recipe of least squares, joint
+    centring and joint velocity limits).
+    """
+
+    tracking_weight: float = 100.0
+    centering: float = 1.0
+
+    program: ClassVar[Program] = "qp"
+    keeps: ClassVar[frozenset[LimitKind]] = frozenset({"velocity"})
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        if not 0 < self.tracking_weight < np.inf:
+            raise DikbenchError("drake-system: tracking_weight must be positive and finite")
+        if not 0 <= self.centering < np.inf:
+            raise DikbenchError("drake-system: centering must be finite and at least 0")
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        J, V = problem.primary.J, problem.primary.V
+        P = J.T @ J
+        q = -J.T @ V
+        kernel = lu_kernel(angular_first(J))
+        if kernel.size:
+            centred = kernel @ kernel.T / self.tracking_weight
+            P += centred
+            q -= centred @ (self.centering * posture_error(problem))
+        lower, upper = scaled_bounds(problem.limits)
+        return solve(QuadraticProgram(P, q, lb=lower, ub=upper))
+
+
+def scaled_bounds(limits: Limits) -> tuple[Array, Array]:
+    """Velocity bounds (nv,) [rad/s], the one towards the nearer position limit scaled down."""
+    velocity = limits.joint.velocity
+    if velocity is None:
+        n = limits.joint.nv
+        return np.full(n, -np.inf), np.full(n, np.inf)
+    if limits.to_lower is None or limits.to_upper is None:
+        return velocity.lower, velocity.upper
+    nearer = limits.to_lower < limits.to_upper
+    distance = np.minimum(limits.to_lower, limits.to_upper)
+    scale = np.clip((distance - NEAR) / (INFLUENCE - NEAR), 0.0, 1.0)
+    lower = np.where(nearer, scale * velocity.lower, velocity.lower)
+    return lower, np.where(nearer, velocity.upper, scale * velocity.upper)

@@ -1,0 +1,88 @@
+"""Lexicographic quadratic programs: each level moves in what the ones above leave free."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from dikbench.array import Array
+from dikbench.box import Box, Braking
+from dikbench.errors import DikbenchError
+from dikbench.linear_algebra import null_space
+from dikbench.problem import DikProblem, LimitKind, Solve
+from dikbench.quadratic_program import Program, QuadraticProgram
+
+UNIQUE = 1e-5
+"""Damping of the levels above the last: solvers are exact on strictly convex programs, and a task
+gives way by (1e-5/sigma)^2 of its velocity along a direction with the singular value sigma."""
+
+
+@dataclass(frozen=True)
+class HierarchicalQp:
+    """Strict priorities inside the limits: a quadratic program per priority level.
+
+        level k:  min_(v, w_k)  1/2 ||w_k||^2
+                  s.t.  J_k v = V_k + w_k,   J_j v = V_j + w_j* for j < k,   lo <= v <= hi
+
+    over the priority levels k = 1, ..., K; J_k (m_k, nv) and V_k (m_k,) are level k's rows
+    multiplied by the square roots of their weights, poses in the task frame; v in rad/s; lo and hi
+    the velocity box. The last level adds 1/2 lambda^2 ||v||^2, the others do with lambda = 1e-5.
+    What the levels above have reached is kept by moving in the null space of their rows,
+    v = v_(k-1) + N z, so that no solver's tolerance lets it go. With one level it is `qp`, with no
+    bound active `nullspace`. Singular where a task is, but inside the limits; leaves the course
+    where a bound binds.
+
+    Attributes:
+        damping: lambda, unsquared, of the last level.
+        rank_tolerance: singular values up to this count as zero (absolute, units of J).
+        braking: how the box approaches a position limit (see `dikbench.box`).
+
+    Source: Kanoun, Lamiraux & Wieber (2011); Escande, Mansard & Wieber (2014), Hierarchical
+    quadratic programming.
+    """
+
+    damping: float = 1e-3
+    rank_tolerance: float = 1e-6
+    braking: Braking = "viable"
+
+    program: ClassVar[Program] = "qp"
+    keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        for name in ("damping", "rank_tolerance"):
+            if not 0 <= getattr(self, name) < np.inf:
+                raise DikbenchError(f"hqp: {name} must be finite and at least 0")
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        n, box, levels = problem.robot.nv, problem.box(self.braking), problem.levels
+        v, N = np.clip(np.zeros(n), box.lower, box.upper), np.eye(n)
+        for number, level in enumerate(levels):
+            if not N.shape[1]:
+                break
+            scale = np.sqrt(np.broadcast_to(level.weight, level.V.shape))
+            A = scale[:, None] * level.J @ N
+            last = number == len(levels) - 1
+            damping = self.damping if last else UNIQUE
+            z = solve(_level(A, scale * (level.V - level.J @ v), v, N, box, damping))
+            v = v + N @ z
+            if not last:
+                N = N @ null_space(A, self.rank_tolerance)
+        return v
+
+
+def _level(A: Array, r: Array, v: Array, N: Array, box: Box, damping: float) -> QuadraticProgram:
+    """Min 1/2 ||A z - r||^2 + 1/2 damping^2 ||v + N z||^2 s.t. the box on v + N z, in z."""
+    k = N.shape[1]
+    P = A.T @ A + damping**2 * np.eye(k)  # N is orthonormal
+    q = -A.T @ r + damping**2 * (N.T @ v)
+    # What the level before reached, to a solver's tolerance, stays feasible: z = 0.
+    lower, upper = np.minimum(box.lower - v, 0.0), np.maximum(box.upper - v, 0.0)
+    if k == len(v):
+        return QuadraticProgram(P, q, lb=lower, ub=upper)
+    h = np.concatenate([upper, -lower])
+    bounded = np.isfinite(h)
+    return QuadraticProgram(P, q, G=np.vstack([N, -N])[bounded], h=h[bounded])

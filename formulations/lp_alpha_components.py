@@ -1,0 +1,93 @@
+"""Alpha scaling by components: x, y, z, roll, pitch and yaw are slowed down each by itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.array import Array
+from dikbench.box import Braking
+from dikbench.errors import DikbenchError, Infeasible
+from dikbench.problem import DikProblem, LimitKind, Solve
+from dikbench.quadratic_program import Program, QuadraticProgram
+from formulations.lp_alpha import regularization_for
+
+UPRIGHT = 1e-3
+"""|cos(pitch)| below which the rates of roll and yaw are not defined."""
+
+
+@dataclass(frozen=True)
+class LpAlphaComponents:
+    """Component-wise alpha scaling: each world axis as fast as the limits allow.
+
+        max_(v, alpha)  sum_i alpha_i - 1/2 rho ||v||^2
+        s.t.            J v = E diag(alpha) E^-1 V,   0 <= alpha_i <= 1,   lo <= v <= hi
+
+    J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s; alpha (m,). E (m, m)
+    maps the rates of x, y, z, roll, pitch, yaw of the task frame in the world (R = Rz(yaw)
+    Ry(pitch) Rx(roll)) to its body twist, so that a teleoperator who pushes against a limit along
+    one axis keeps the others: off course on purpose, and dependent on the axes. lo and hi are the
+    velocity box. Weights play no part.
+
+    Attributes:
+        regularization: rho; None: 1e-4 if the arm has more joints than the task has rows, else 0.
+        braking: how the box approaches a position limit (see `dikbench.box`).
+
+    Raises:
+        Infeasible: near cos(pitch) = 0, where E has no inverse.
+
+    Source: Tedrake, Robotic Manipulation, ch. 3 (the component-wise relaxation for teleoperation).
+    """
+
+    regularization: float | None = None
+    braking: Braking = "viable"
+
+    program: ClassVar[Program] = "lp"
+    keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        if self.regularization is not None and not 0 <= self.regularization < np.inf:
+            raise DikbenchError("lp-alpha-components: regularization must be finite and at least 0")
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        task, robot = problem.primary, problem.robot
+        m, n = task.J.shape
+        pin.forwardKinematics(robot.model, robot.scratch, problem.q)
+        rotation = pin.updateFramePlacement(robot.model, robot.scratch, robot.frame_id).rotation
+        E = twist_from_rates(rotation)
+        if m != 6:
+            E = E[np.ix_(robot.task_rows, robot.task_rows)]
+        P = np.zeros((n + m, n + m))
+        P[:n, :n].flat[:: n + 1] = regularization_for(task, self.regularization)
+        q = np.concatenate([np.zeros(n), -np.ones(m)])
+        A = np.hstack([task.J, -E * np.linalg.solve(E, task.V)])
+        box = problem.box(self.braking)
+        lower = np.concatenate([box.lower, np.zeros(m)])
+        upper = np.concatenate([box.upper, np.ones(m)])
+        return solve(QuadraticProgram(P, q, A=A, b=np.zeros(m), lb=lower, ub=upper))[:n]
+
+
+def twist_from_rates(rotation: Array) -> Array:
+    """E (6, 6): rates of x, y, z, roll, pitch, yaw in the world to a body twist (linear; angular).
+
+    Args:
+        rotation: R = Rz(yaw) Ry(pitch) Rx(roll), (3, 3).
+
+    Raises:
+        Infeasible: where roll and yaw turn about the same axis.
+    """
+    pitch = np.arctan2(-rotation[2, 0], np.hypot(rotation[0, 0], rotation[1, 0]))
+    if abs(np.cos(pitch)) < UPRIGHT:
+        raise Infeasible("roll, pitch and yaw have no rates near cos(pitch) = 0")
+    yaw = np.arctan2(rotation[1, 0], rotation[0, 0])
+    c, s, cp, sp = np.cos(yaw), np.sin(yaw), np.cos(pitch), np.sin(pitch)
+    axes = np.array([[c * cp, -s, 0.0], [s * cp, c, 0.0], [-sp, 0.0, 1.0]])  # in the world
+    E = np.zeros((6, 6))
+    E[:3, :3] = rotation.T
+    E[3:, 3:] = rotation.T @ axes
+    return E

@@ -1,0 +1,109 @@
+"""NEO: reactive control with a slack on the task and a reward for manipulability."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from dikbench.array import Array
+from dikbench.errors import DikbenchError
+from dikbench.limits import Limits
+from dikbench.problem import DikProblem, LimitKind, Solve
+from dikbench.quadratic_program import Program, QuadraticProgram
+from formulations.manipulability import manipulability_gradient
+
+LARGEST_SLACK = 10.0
+"""Of each row of the task [m/s; rad/s]."""
+
+SMALLEST_ERROR = 1e-6
+"""Below this ||e||_1 (m, rad) the price of the slack does not rise any more."""
+
+
+@dataclass(frozen=True)
+class Neo:
+    """NEO's program without obstacles: a task that may give way for a better posture.
+
+        min_(v, delta)  1/2 lambda_v ||v||^2 + 1/2 ||delta||^2 / ||e||_1 - k_m J_m^T v
+        s.t.            J v + delta = V,   |delta_i| <= 10,   v_min <= v <= v_max,
+                        v_i <= eta (rho_i - rho_s)/(rho_0 - rho_s)   within rho_0 of a limit
+
+    J (m, nv), V (m,) and e (m,) are the primary task's (m/s, rad/s; m, rad), in the task frame; v
+    in rad/s; J_m the gradient of the manipulability sqrt det(J J^T), (nv,); rho_i the distance to
+    the position limit ahead [rad], and likewise below. The slack grows dear as the error falls, so
+    that the arm first seeks a better posture and then the target. Leaves the course to do so. On
+    arms of joints with one degree of freedom each. Weights play no part.
+
+    Attributes:
+        velocity_weight: lambda_v.
+        manipulability_gain: k_m; 0 leaves the manipulability out.
+        damper_gain: eta [1/s], the speed at the influence distance [rad/s].
+        stop_distance: rho_s [rad].
+        influence_distance: rho_0 [rad].
+
+    Source: Haviland & Corke (2021), NEO: A novel expeditious optimisation algorithm for reactive
+    motion control of manipulators.
+    """
+
+    velocity_weight: float = 0.01
+    manipulability_gain: float = 1.0
+    damper_gain: float = 1.0
+    stop_distance: float = 0.05
+    influence_distance: float = 0.9
+
+    program: ClassVar[Program] = "qp"
+    keeps: ClassVar[frozenset[LimitKind]] = frozenset({"velocity"})
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        if not 0 < self.velocity_weight < np.inf:
+            raise DikbenchError("neo: velocity_weight must be positive and finite")
+        if not 0 <= self.manipulability_gain < np.inf:
+            raise DikbenchError("neo: manipulability_gain must be finite and at least 0")
+        if not 0 < self.damper_gain < np.inf:
+            raise DikbenchError("neo: damper_gain must be positive and finite")
+        if not 0 <= self.stop_distance < self.influence_distance < np.inf:
+            raise DikbenchError("neo: stop_distance must be at least 0, below influence_distance")
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        task = problem.primary
+        m, n = task.J.shape
+        price = 1 / max(float(np.abs(task.error).sum()), SMALLEST_ERROR)
+        # Divided by the price: the same program, with numbers that solvers like near the target.
+        scale = min(1.0, 1 / price)
+        P = np.diag(scale * np.concatenate([np.full(n, self.velocity_weight), np.full(m, price)]))
+        q = np.zeros(n + m)
+        if self.manipulability_gain:
+            q[:n] = -scale * self.manipulability_gain * manipulability_gradient(task.J)
+        lower, upper = self._bounds(problem.limits)
+        slack = np.full(m, LARGEST_SLACK)
+        A = np.hstack([task.J, np.eye(m)])
+        x = solve(
+            QuadraticProgram(
+                P,
+                q,
+                A=A,
+                b=task.V,
+                lb=np.concatenate([lower, -slack]),
+                ub=np.concatenate([upper, slack]),
+            )
+        )
+        return x[:n]
+
+    def _bounds(self, limits: Limits) -> tuple[Array, Array]:
+        """Velocity limits and dampers, (nv,) [rad/s]; never beyond a standstill from outside."""
+        n, velocity = limits.joint.nv, limits.joint.velocity
+        lower = np.full(n, -np.inf) if velocity is None else velocity.lower
+        upper = np.full(n, np.inf) if velocity is None else velocity.upper
+        if limits.to_lower is not None and limits.to_upper is not None:
+            lower = np.maximum(lower, -self._damper(limits.to_lower, -lower))
+            upper = np.minimum(upper, self._damper(limits.to_upper, upper))
+        return lower, upper
+
+    def _damper(self, distance: Array, free: Array) -> Array:
+        """The speed allowed towards a limit at a distance, (nv,) [rad/s]."""
+        share = (distance - self.stop_distance) / (self.influence_distance - self.stop_distance)
+        slowed = self.damper_gain * np.maximum(share, 0.0)
+        return np.where(distance < self.influence_distance, slowed, free)

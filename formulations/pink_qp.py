@@ -1,0 +1,60 @@
+"""The quadratic program of Pink."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from dikbench.array import Array
+from dikbench.problem import DikProblem, LimitKind, Solve
+from dikbench.quadratic_program import Program
+from formulations.displacement_qp import check_gains, displacement_program
+
+
+@dataclass(frozen=True)
+class PinkQp:
+    """The quadratic program as Pink poses it: all tasks at once, with the logarithm's derivative.
+
+        min_v  sum_i 1/2 ||Jl_i (J_i v - V_i)||^2_(W_i) + 1/2 (lambda^2 + mu_i) ||v||^2
+        s.t.   g (q_min - q)/dt <= v <= g (q_max - q)/dt,   v_min <= v <= v_max,   g = position_gain
+
+    over all tasks i (priorities play no part), poses in the task frame, v in rad/s; W_i is the
+    task's weight (Pink's cost squared), Jl_i = Jlog6 of a pose task, mu_i = lm_damping dt^2
+    ||V_i||^2_(W_i). Pink's own gain is 1: a target is to be reached within one step, 1/dt in our
+    terms; here the task's gain stands. With next to no damping velocities are only bounded by the
+    limits near a singularity, and by nothing where none is in force.
+
+    Attributes:
+        damping: lambda, unsquared; Pink adds lambda^2 = 1e-12.
+        lm_damping: factor of the damping by the squared error of pose tasks.
+        position_gain: share of the distance to a position limit per step.
+
+    Source: pin-pink 4.4 (Caron et al.), solve_ik.
+    """
+
+    damping: float = 1e-6
+    lm_damping: float = 0.0
+    position_gain: float = 0.5
+
+    program: ClassVar[Program] = "qp"
+    keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        check_gains(
+            "pink-qp",
+            damping=self.damping,
+            lm_damping=self.lm_damping,
+            position_gain=self.position_gain,
+        )
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        return solve(
+            displacement_program(
+                problem,
+                damping=self.damping,
+                lm_damping=self.lm_damping,
+                position_gain=self.position_gain,
+            )
+        )

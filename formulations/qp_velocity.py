@@ -1,0 +1,52 @@
+"""The lecture's first quadratic program: velocity bounds only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from dikbench.array import Array
+from dikbench.errors import DikbenchError
+from dikbench.linear_algebra import scaled_identity
+from dikbench.problem import DikProblem, LimitKind, Solve
+from dikbench.quadratic_program import Program, QuadraticProgram
+
+
+@dataclass(frozen=True)
+class QpVelocity:
+    """Least squares inside the velocity limits, the first step from the pseudo-inverse to `qp`.
+
+        min_v  1/2 ||J v - V||^2 + 1/2 lambda^2 ||v||^2   s.t.   v_min <= v <= v_max
+
+    J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s. Leaves the course
+    where a bound binds, and runs into position limits. Weights and other tasks play no part.
+
+    Attributes:
+        damping: lambda, unsquared; not zero by default, else the minimiser is not unique on a
+            redundant arm.
+
+    Source: Tedrake, Robotic Manipulation, ch. 3 (the quadratic program with velocity constraints).
+    """
+
+    damping: float = 1e-3
+
+    program: ClassVar[Program] = "qp"
+    keeps: ClassVar[frozenset[LimitKind]] = frozenset({"velocity"})
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        if not 0 <= self.damping < np.inf:
+            raise DikbenchError("qp-velocity: damping must be finite and at least 0")
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        J, n = problem.primary.J, problem.robot.nv
+        P = J.T.dot(J) + scaled_identity(n, self.damping**2)
+        limit = problem.limits.joint.velocity
+        if limit is None:
+            return solve(QuadraticProgram(P, -J.T.dot(problem.primary.V)))
+        return solve(
+            QuadraticProgram(P, -J.T.dot(problem.primary.V), lb=limit.lower, ub=limit.upper)
+        )

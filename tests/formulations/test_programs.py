@@ -1,0 +1,312 @@
+"""Laws that solve programs against each other and against closed forms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from dikbench.array import Array
+from dikbench.errors import DikbenchError, Infeasible
+from dikbench.kinematics import Kinematics
+from dikbench.linear_algebra import null_space
+from dikbench.problem import DikProblem, program_of
+from dikbench.registry import make_formulation
+from dikbench.robot import Robot
+from dikbench.robot_catalogue import load_robot
+from dikbench.solvers.catalogue import parse_solver
+from dikbench.solvers.checked import make_solve
+from dikbench.tasks import LinearizedTask, PositionTask, PostureTask
+from formulations.lp_alpha_components import twist_from_rates
+from formulations.lu_kernel import lu_kernel
+from formulations.manipulability import manipulability_gradient
+
+DT = 0.01
+
+
+def _velocity(law: str, problem: DikProblem) -> Array:
+    formulation = make_formulation(law)
+    program = program_of(formulation)
+    solve = make_solve(None if program is None else parse_solver("daqp"), program)
+    solve.begin_step(0)
+    return formulation.velocity(problem, solve)
+
+
+def _problem(
+    robot: Robot, random: np.random.Generator, speed: float, *, second: str = "posture"
+) -> DikProblem:
+    """A random state near the robot's start with a random twist and a second task."""
+    q = pin.integrate(robot.model, robot.q0, random.uniform(-0.4, 0.4, robot.nv))
+    kinematics = Kinematics(robot)
+    kinematics.update(q)
+    J = kinematics.jacobian(robot.frame_id)
+    tasks = [LinearizedTask(J, speed * random.normal(size=6), np.zeros(6))]
+    if second == "posture":
+        target = pin.integrate(robot.model, q, random.uniform(-0.3, 0.3, robot.nv))
+        tasks.append(PostureTask(target=target).linearize(kinematics))
+    elif second == "elbow":
+        X = kinematics.placement(robot.model.getFrameId("panda_link4"))
+        point = X.translation + random.uniform(-0.2, 0.2, 3)
+        elbow = PositionTask(target=point, frame="panda_link4", priority=2)
+        tasks.append(elbow.linearize(kinematics))
+    return DikProblem(robot, q, None, DT, tasks, robot.limits.at(q))
+
+
+def _problems(count: int, speed: float, second: str = "posture") -> Iterator[DikProblem]:
+    robot, random = load_robot("panda"), np.random.default_rng(0)
+    for _ in range(count):
+        yield _problem(robot, random, speed, second=second)
+
+
+# --- hierarchies
+
+
+def test_a_hierarchy_of_one_level_is_the_weighted_program() -> None:
+    """Bounds active or not."""
+    for speed in (0.1, 2.0):
+        for problem in _problems(30, speed, "none"):
+            one, qp = (_velocity(law, problem) for law in ("hqp", "qp[braking=viable]"))
+            assert one == pytest.approx(qp, abs=1e-6)
+
+
+@pytest.mark.parametrize("second", ["posture", "elbow"])
+def test_a_hierarchy_inside_the_limits_is_the_null_space_projection(second: str) -> None:
+    """Two levels, no bound active, no damping: the recursive projection."""
+    free = load_robot("panda").with_limits(position=None, velocity=None)
+    random = np.random.default_rng(1)
+    for _ in range(30):
+        problem = _problem(free, random, 0.1, second=second)
+        hierarchy = _velocity("hqp[damping=0]", problem)
+        projection = _velocity("nullspace", problem)
+        for level in problem.levels:
+            assert level.J @ hierarchy == pytest.approx(level.J @ projection, abs=1e-7)
+        if second == "posture":
+            assert hierarchy == pytest.approx(projection, abs=1e-7)
+
+
+@pytest.mark.parametrize("second", ["posture", "elbow"])
+@pytest.mark.parametrize("speed", [0.1, 1.0, 3.0])
+def test_the_second_level_does_not_leak_into_the_first(second: str, speed: float) -> None:
+    """What level 1 reaches alone it keeps, bounds active or not, to rounding."""
+    for problem in _problems(40, speed, second):
+        alone = DikProblem(problem.robot, problem.q, None, DT, problem.tasks[:1], problem.limits)
+        J = problem.tasks[0].J
+        first = _velocity("hqp[damping=1e-5]", alone)  # as the levels above the last have
+        both = _velocity("hqp", problem)
+        assert J @ both == pytest.approx(J @ first, abs=1e-7)
+
+
+def test_the_weighted_program_tends_to_the_hierarchy() -> None:
+    """With weights of 1e6 to 1 the second task gives way to the first, inside the limits."""
+    for problem in _problems(20, 1.0):
+        first, second = problem.tasks
+        heavy = LinearizedTask(first.J, first.V, first.error, 1e6)
+        weighted = DikProblem(problem.robot, problem.q, None, DT, [heavy, second], problem.limits)
+        hierarchy, qp = _velocity("hqp", problem), _velocity("qp", weighted)
+        assert first.J @ hierarchy == pytest.approx(first.J @ qp, abs=1e-3)
+        assert hierarchy == pytest.approx(qp, abs=2e-2)
+
+
+# --- programs without limits, and with velocity limits only
+
+
+def test_least_squares_in_velocity_limits_is_damped_least_squares_where_none_binds() -> None:
+    """And elsewhere stays inside them, where clipping would too, with less error."""
+    for problem in _problems(30, 0.05, "none"):
+        qp, dls = (_velocity(law, problem) for law in ("qp-velocity", "dls[damping=1e-3]"))
+        assert qp == pytest.approx(dls, abs=1e-7)
+    for problem in _problems(30, 3.0, "none"):
+        task, limit = problem.primary, problem.limits.joint.velocity
+        assert limit is not None
+        qp = _velocity("qp-velocity", problem)
+        assert np.all(qp <= limit.upper + 1e-7)
+        assert np.all(qp >= limit.lower - 1e-7)
+        clip = _velocity("pinv[after=clip]", problem)
+        error, clipped = (float(np.linalg.norm(task.J @ v - task.V)) for v in (qp, clip))
+        assert error <= clipped + 1e-4
+
+
+# --- alpha in stages and by components
+
+
+def _alpha(problem: DikProblem, v: Array) -> float:
+    task = problem.primary
+    return float(task.V @ task.J @ v / (task.V @ task.V))
+
+
+def test_two_stages_go_as_far_as_one_and_nearer_to_the_posture() -> None:
+    """The same alpha as the linear program; the null space serves the posture, Drake's leaks."""
+    leaks = 0
+    for problem in _problems(60, 1.0):
+        one = _velocity("lp-alpha[regularization=0]", problem)
+        two = _velocity("alpha-two-stage", problem)
+        drake = _velocity("drake[centering=10]", problem)
+        posture = problem.tasks[1]
+        assert _alpha(problem, two) == pytest.approx(_alpha(problem, one), abs=1e-7)
+        assert _alpha(problem, drake) <= _alpha(problem, two) + 1e-7
+        leaks += _alpha(problem, drake) < _alpha(problem, two) - 1e-2
+        off_one, off_two = (float(np.linalg.norm(posture.V - v)) for v in (one, two))
+        assert off_two <= off_one + 1e-6
+    assert leaks > 10
+
+
+def test_components_are_the_whole_where_all_is_feasible() -> None:
+    """Alpha = 1 in each: J v = V."""
+    for problem in _problems(20, 0.02, "none"):
+        v = _velocity("lp-alpha-components", problem)
+        assert problem.primary.J @ v == pytest.approx(problem.primary.V, abs=1e-5)
+
+
+def test_components_keep_axes_that_the_whole_would_slow_down() -> None:
+    """The sum of the components is at least six times the common alpha."""
+    gained = 0
+    for problem in _problems(30, 1.5, "none"):
+        robot, task = problem.robot, problem.primary
+        kinematics = Kinematics(robot)
+        kinematics.update(problem.q)
+        E = twist_from_rates(kinematics.placement(robot.frame_id).rotation)
+        v = _velocity("lp-alpha-components[regularization=0]", problem)
+        alphas = np.linalg.solve(E, task.J @ v) / np.linalg.solve(E, task.V)
+        common = _alpha(problem, _velocity("lp-alpha[regularization=0]", problem))
+        assert np.all(alphas >= -1e-6)
+        assert np.all(alphas <= 1 + 1e-6)
+        assert alphas.sum() >= 6 * common - 1e-6
+        gained += alphas.sum() > 6 * common + 0.1
+    assert gained > 20
+
+
+@given(
+    angles=arrays(float, 3, elements=st.floats(-1.4, 1.4)),
+    rates=arrays(float, 3, elements=st.floats(-1, 1)),
+)
+def test_rates_of_roll_pitch_and_yaw_make_the_twist(angles: Array, rates: Array) -> None:
+    """By central differences of R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    h = 1e-6
+    R, ahead, behind = (pin.rpy.rpyToMatrix(angles + side * h * rates) for side in (0, 1, -1))
+    angular = pin.log3(behind.T @ ahead) / (2 * h)
+    E = twist_from_rates(R)
+    assert E[3:, 3:] @ rates == pytest.approx(angular, abs=1e-6)
+    velocity = np.array([0.3, -0.2, 0.1])
+    assert E[:3, :3] @ velocity == pytest.approx(R.T @ velocity)
+
+
+def test_upright_there_are_no_rates() -> None:
+    """At a pitch of 90 degrees roll and yaw turn about the same axis."""
+    with pytest.raises(Infeasible, match="no rates near cos"):
+        twist_from_rates(pin.rpy.rpyToMatrix(np.array([0.2, np.pi / 2, 0.4])))
+
+
+# --- NEO
+
+
+def test_neo_without_its_reward_is_damped_least_squares() -> None:
+    """Far from limits: min lambda ||v||^2 + ||V - J v||^2 / ||e||_1."""
+    robot = load_robot("panda").with_limits(position=None, velocity=None)
+    random = np.random.default_rng(3)
+    for _ in range(20):
+        problem = _problem(robot, random, 0.1, second="none")
+        task = problem.tasks[0]
+        task.error = random.uniform(-0.05, 0.05, 6)
+        e = float(np.abs(task.error).sum())
+        damped = _velocity(f"dls[damping={float(np.sqrt(0.01 * e))!r}]", problem)
+        assert _velocity("neo[manipulability_gain=0]", problem) == pytest.approx(damped, abs=1e-6)
+
+
+def test_neos_reward_raises_the_manipulability() -> None:
+    """To first order, compared with the same program without it."""
+    better = 0
+    for problem in _problems(30, 0.05, "none"):
+        problem.tasks[0].error = np.full(6, 0.1)
+        J = problem.tasks[0].J
+        gradient = manipulability_gradient(J)
+        with_it, without = (
+            _velocity(f"neo[manipulability_gain={gain}]", problem) for gain in (1, 0)
+        )
+        better += float(gradient @ with_it) > float(gradient @ without)
+    assert better == 30
+
+
+@pytest.mark.parametrize("name", ["panda", "ur5", "kinova", "planar3r"])
+def test_manipulability_gradient_is_the_derivative(name: str) -> None:
+    """By central differences."""
+    robot, random = load_robot(name), np.random.default_rng(4)
+    kinematics, rows = Kinematics(robot), list(robot.task_rows)
+
+    def manipulability(q: Array) -> float:
+        kinematics.update(q)
+        J = kinematics.jacobian(robot.frame_id)[rows]
+        return float(np.sqrt(np.linalg.det(J @ J.T)))
+
+    for _ in range(5):
+        q = pin.integrate(robot.model, robot.q0, random.uniform(-0.5, 0.5, robot.nv))
+        kinematics.update(q)
+        found = manipulability_gradient(kinematics.jacobian(robot.frame_id)[rows].copy())
+        step = 1e-6 * np.eye(robot.nv)
+        expected = [
+            (
+                manipulability(pin.integrate(robot.model, q, s))
+                - manipulability(pin.integrate(robot.model, q, -s))
+            )
+            / 2e-6
+            for s in step
+        ]
+        assert found == pytest.approx(expected, abs=1e-8)
+
+
+def test_manipulability_has_no_gradient_at_a_singularity() -> None:
+    """Where it is zero."""
+    assert np.array_equal(manipulability_gradient(np.zeros((6, 7))), np.zeros(7))
+
+
+# --- kernels
+
+matrices = arrays(float, (3, 5), elements=st.integers(-3, 3).map(float))
+
+
+@settings(deadline=None)
+@given(A=matrices)
+def test_the_lu_kernel_spans_the_null_space(A: Array) -> None:
+    """A K = 0, as many columns as the rank leaves, each with a one at a column of its own."""
+    K = lu_kernel(A)
+    rank = int(np.linalg.matrix_rank(A))
+    assert K.shape == (5, 5 - rank)
+    assert A @ K == pytest.approx(np.zeros((3, 5 - rank)), abs=1e-9)
+    ones = [int(np.flatnonzero(K[:, k] == 1.0)[-1]) for k in range(5 - rank)]
+    assert np.linalg.matrix_rank(K) == 5 - rank
+    assert len(ones) == 5 - rank
+
+
+@settings(deadline=None)
+@given(A=matrices)
+def test_the_null_space_is_orthonormal_and_complete(A: Array) -> None:
+    """A N = 0, N^T N = I."""
+    N = null_space(A, 1e-9)
+    rank = int(np.linalg.matrix_rank(A))
+    assert N.shape == (5, 5 - rank)
+    assert A @ N == pytest.approx(np.zeros((3, 5 - rank)), abs=1e-9)
+    assert N.T @ N == pytest.approx(np.eye(5 - rank), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("law", "words"),
+    [
+        ("drake[centering=-1]", "drake: centering must be finite"),
+        ("drake-system[tracking_weight=0]", "drake-system: tracking_weight must be positive"),
+        ("hqp[damping=-1]", "hqp: damping must be finite"),
+        ("neo[stop_distance=1]", "neo: stop_distance must be at least 0, below"),
+        ("pink-qp[position_gain=0]", "pink-qp: position_gain must be above 0"),
+        ("mink-qp[lm_damping=-1]", "mink-qp: lm_damping must be finite"),
+        ("qp-velocity[damping=inf]", "qp-velocity: damping must be finite"),
+        ("alpha-two-stage[rank_tolerance=-1]", "alpha-two-stage: rank_tolerance must be"),
+        ("lp-alpha-components[regularization=-1]", "lp-alpha-components: regularization must be"),
+    ],
+)
+def test_parameters_out_of_range_are_one_line(law: str, words: str) -> None:
+    """The law, the parameter, what would be valid."""
+    with pytest.raises(DikbenchError, match=words):
+        make_formulation(law)
