@@ -13,6 +13,8 @@ from formulations.damped_least_squares import DampedLeastSquares
 from formulations.lp_alpha import LpAlpha
 from formulations.lp_alpha_cvxpy import LpAlphaCvxpy
 from formulations.nullspace import Nullspace
+from formulations.nullspace_robust import NullspaceRobust
+from formulations.nullspace_unprojected import NullspaceUnprojected
 from formulations.pseudo_inverse import PseudoInverse
 from formulations.weighted_qp import WeightedQp
 
@@ -21,6 +23,8 @@ FORMULATIONS: Mapping[str, type[Formulation]] = MappingProxyType(
         "pinv": PseudoInverse,
         "dls": DampedLeastSquares,
         "nullspace": Nullspace,
+        "nullspace-robust": NullspaceRobust,
+        "nullspace-unprojected": NullspaceUnprojected,
         "qp": WeightedQp,
         "lp-alpha": LpAlpha,
         "lp-alpha-cvxpy": LpAlphaCvxpy,
