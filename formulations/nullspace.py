@@ -24,7 +24,8 @@ class Nullspace:
     task frame; A^# = A^T (A A^T + lambda^2 I)^-1; v in rad/s. Does every task as well as those
     above it allow and, with the exact projector, never disturbs them; knows no limits; without
     damping it is singular wherever a task is, or where two tasks become dependent. The damped
-    "projector" is a common mistake: it lets lower tasks into the ones above. Weights play no part.
+    "projector" is a common mistake: it lets lower tasks into those above, and as A_k^# makes up for
+    what it holds back, a posture below the first task all but replaces it. Weights play no part.
 
     Attributes:
         damping: lambda, unsquared (units of J); 0 by default: every task exactly.
