@@ -125,6 +125,21 @@ class JointLimits:
             return None
         return 0.1 * self.velocity.upper, -0.1 * self.velocity.lower
 
+    @cached_property
+    def middle(self) -> Array | None:
+        """Middle of the position limits, (nv,) [rad or m], NaN where a joint has not both.
+
+        None where position limits are not in force.
+        """
+        if self.position is None:
+            return None
+        lower, upper = self.position.lower, self.position.upper
+        limited = np.isfinite(lower) & np.isfinite(upper)
+        middle = np.full(self.nv, np.nan)
+        middle[limited] = (lower[limited] + upper[limited]) / 2
+        middle.flags.writeable = False
+        return middle
+
     def at(self, q: Array) -> Limits:
         """The limits as seen from configuration q (nq,)."""
         if self.position is None:

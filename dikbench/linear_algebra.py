@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Literal
 
 import numpy as np
 from scipy.linalg.lapack import dgesdd, dposv
 
 from dikbench.array import Array
+
+Projector = Literal["exact", "damped"]
 
 
 def pseudo_inverse(A: Array, tolerance: float) -> Array:
@@ -45,3 +48,42 @@ def null_space(A: Array, tolerance: float) -> Array:
     _, singular, Vt, _ = dgesdd(A, full_matrices=1)
     basis: Array = Vt[int(np.count_nonzero(singular > tolerance)) :].T
     return basis
+
+
+class DampedInverse:
+    """A^# = A^T (A A^T + lambda^2 I)^-1, (n, m), of a matrix A (m, n), by its singular values.
+
+    Those up to `tolerance` (absolute, in the units of A) are taken as zero. With no damping it is
+    the Moore-Penrose inverse A^+.
+    """
+
+    __slots__ = ("_U", "_Vt", "_damped", "_kept", "_singular")
+
+    def __init__(self, A: Array, tolerance: float, damping: float) -> None:
+        self._U, self._singular, self._Vt, _ = dgesdd(A, full_matrices=0)
+        self._kept = self._singular > tolerance
+        self._damped = self._singular**2 + damping**2
+
+    def times(self, b: Array) -> Array:
+        """A^# b, (n,)."""
+        gain = np.divide(
+            self._singular, self._damped, out=np.zeros_like(self._damped), where=self._kept
+        )
+        x: Array = (gain * b.dot(self._U)).dot(self._Vt)
+        return x
+
+    def taken(self, projector: Projector) -> Array:
+        """What A takes of the space of v, (n, n): I minus it is what A leaves free.
+
+        Args:
+            projector: "exact": A^+ A, the orthogonal projector onto the row space of A; "damped":
+                A^# A, which with damping is no projector.
+        """
+        if projector == "exact":
+            share = self._kept.astype(float)
+        else:
+            share = np.divide(
+                self._singular**2, self._damped, out=np.zeros_like(self._damped), where=self._kept
+            )
+        matrix: Array = (self._Vt.T * share).dot(self._Vt)
+        return matrix

@@ -14,22 +14,30 @@ from formulations.damped_least_squares import DampedLeastSquares
 from formulations.drake import Drake
 from formulations.drake_system import DrakeSystem
 from formulations.hierarchical_qp import HierarchicalQp
+from formulations.joint_centering import JointCentering
 from formulations.lp_alpha import LpAlpha
 from formulations.lp_alpha_components import LpAlphaComponents
 from formulations.lp_alpha_cvxpy import LpAlphaCvxpy
 from formulations.mink_qp import MinkQp
 from formulations.neo import Neo
 from formulations.nullspace import Nullspace
+from formulations.nullspace_robust import NullspaceRobust
+from formulations.nullspace_unprojected import NullspaceUnprojected
 from formulations.pink_qp import PinkQp
 from formulations.pseudo_inverse import PseudoInverse
 from formulations.qp_velocity import QpVelocity
+from formulations.weighted_least_norm import WeightedLeastNorm
 from formulations.weighted_qp import WeightedQp
 
 FORMULATIONS: Mapping[str, type[Formulation]] = MappingProxyType(
     {
         "pinv": PseudoInverse,
         "dls": DampedLeastSquares,
+        "joint-centering": JointCentering,
+        "weighted-least-norm": WeightedLeastNorm,
         "nullspace": Nullspace,
+        "nullspace-robust": NullspaceRobust,
+        "nullspace-unprojected": NullspaceUnprojected,
         "qp": WeightedQp,
         "qp-velocity": QpVelocity,
         "hqp": HierarchicalQp,

@@ -8,7 +8,7 @@ import numpy as np
 
 from dikbench.array import Array
 from dikbench.errors import DikbenchError
-from dikbench.linear_algebra import pseudo_inverse
+from dikbench.linear_algebra import DampedInverse, Projector, scaled_identity
 from dikbench.problem import DikProblem, Solve
 
 
@@ -16,37 +16,46 @@ from dikbench.problem import DikProblem, Solve
 class Nullspace:
     """Strict task priority: each task moves only what the tasks above it leave free.
 
-        v_0 = 0,  N_0 = I
-        v_k = v_(k-1) + (J_k N_(k-1))^+ (V_k - J_k v_(k-1))
-        N_k = N_(k-1) - (J_k N_(k-1))^+ (J_k N_(k-1))
+        v_0 = 0,  N_0 = I,  A_k = J_k N_(k-1)
+        v_k = v_(k-1) + A_k^# (V_k - J_k v_(k-1))
+        N_k = N_(k-1) - A_k^+ A_k   (exact)   or   N_(k-1) - A_k^# A_k   (damped)
 
     over the priority levels k = 1, 2, ...; J_k (m_k, nv) and V_k (m_k,) are level k's, poses in the
-    task frame; v in rad/s. Protects the first task exactly and knows no limits; singular wherever
-    a task is, or where two tasks become dependent. Weights play no part.
+    task frame; A^# = A^T (A A^T + lambda^2 I)^-1; v in rad/s. Does every task as well as those
+    above it allow and, with the exact projector, never disturbs them; knows no limits; without
+    damping it is singular wherever a task is, or where two tasks become dependent. The damped
+    "projector" is a common mistake: it lets lower tasks into those above, and as A_k^# makes up for
+    what it holds back, a posture below the first task all but replaces it. Weights play no part.
 
     Attributes:
-        rank_tolerance: singular values of J_k N_(k-1) up to this count as zero (absolute, units of
-            J_k: a relative one explodes where nothing is left free).
+        damping: lambda, unsquared (units of J); 0 by default: every task exactly.
+        projector: whether what a task leaves free is computed without damping or with it.
+        rank_tolerance: singular values of A_k up to this count as zero (absolute, units of J_k: a
+            relative one explodes where nothing is left free).
 
     Source: Nakamura, Hanafusa & Yoshikawa (1987), Task-priority based redundancy control; Siciliano
-    & Slotine (1991), A general framework for managing multiple tasks.
+    & Slotine (1991), A general framework for managing multiple tasks in highly redundant robotic
+    systems [Nakamura1987, Siciliano1991].
     """
 
+    damping: float = 0.0
+    projector: Projector = "exact"
     rank_tolerance: float = 1e-6
 
     def __post_init__(self) -> None:
         """Check the parameters."""
-        if not 0 <= self.rank_tolerance < np.inf:
-            raise DikbenchError("nullspace: rank_tolerance must be finite and at least 0")
+        for name in ("damping", "rank_tolerance"):
+            if not 0 <= getattr(self, name) < np.inf:
+                raise DikbenchError(f"nullspace: {name} must be finite and at least 0")
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
         n = problem.robot.nv
-        v = np.zeros(n)
-        N = np.eye(n)
+        v, N = np.zeros(n), scaled_identity(n, 1.0)
+        above: DampedInverse | None = None
         for level in problem.levels:
-            free = level.J @ N
-            inverse = pseudo_inverse(free, self.rank_tolerance)
-            v = v + inverse @ (level.V - level.J @ v)
-            N = N - inverse @ free
+            if above is not None:
+                N = N - above.taken(self.projector)
+            above = DampedInverse(level.J.dot(N), self.rank_tolerance, self.damping)
+            v = v + above.times(level.V - level.J.dot(v))
         return v

@@ -69,9 +69,9 @@ def middle_posture(robot: Robot) -> Array:
     Raises:
         DikbenchError: if a joint has no position limits.
     """
-    position = robot.limits.position
-    if position is None or not np.isfinite(position.upper - position.lower).all():
+    middle = robot.limits.middle
+    if middle is None or np.isnan(middle).any():
         raise DikbenchError(f"robot {robot.name}: not every joint has position limits to centre")
-    middle = robot.q0.copy()
-    middle[robot.limits.q_index] = (position.lower + position.upper) / 2
-    return middle
+    posture = robot.q0.copy()
+    posture[robot.limits.q_index] = middle
+    return posture

@@ -46,6 +46,20 @@ def test_switched_law_keeps_the_contract(selector: str) -> None:
     check_formulation(make_formulation(selector))
 
 
+@pytest.mark.parametrize(
+    "selector",
+    [
+        "nullspace[damping=0.1,projector=damped]",
+        "nullspace-robust[damping=0.1,projector=damped]",
+        "joint-centering[damping=0.1,projector=damped]",
+        "weighted-least-norm[damping=0.1]",
+    ],
+)
+def test_damped_law_keeps_the_contract(selector: str) -> None:
+    """Laws that are not damped by default keep the contract with damping."""
+    check_formulation(make_formulation(selector))
+
+
 @pytest.mark.parametrize("solver", ["osqp", "piqp"])
 def test_qp_keeps_the_contract_with_other_solvers(solver: str) -> None:
     """The quadratic program keeps the contract with solvers of other kinds than the default."""

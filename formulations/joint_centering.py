@@ -1,0 +1,69 @@
+"""Joint centring by gradient projection."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dikbench.array import Array
+from dikbench.errors import DikbenchError
+from dikbench.limits import Limits
+from dikbench.linear_algebra import DampedInverse, Projector
+from dikbench.problem import DikProblem, Solve
+
+
+@dataclass(frozen=True)
+class JointCentering:
+    """Joint centring: do the task, and draw the joints to the middle of their range meanwhile.
+
+        v = J^# V + (I - J^+ J) v_2   (exact)   or   J^# V + (I - J^# J) v_2   (damped)
+        v_2 = -k (q - q_mid),  q_mid = (q_min + q_max) / 2
+
+    joint by joint, 0 for a joint that has not both limits; J (m, nv) and V (m,) are the primary
+    task's, in the task frame; J^# = J^T (J J^T + lambda^2 I)^-1; v in rad/s. Stays away from the
+    joints' limits as far as the null space allows, and keeps none. Other tasks and weights play no
+    part: for a posture of one's own choice take `nullspace` and a posture task.
+
+    Attributes:
+        gain: k [1/s].
+        damping: lambda, unsquared (units of J); 0 by default: the task exactly.
+        projector: whether what the task leaves free is computed without damping or with it; with
+            it centring leaks into the task.
+        rank_tolerance: singular values of J up to this count as zero (absolute, units of J).
+
+    Source: Liegeois (1977), Automatic supervisory control of the configuration and behavior of
+    multibody mechanisms [Liegeois1977].
+    """
+
+    gain: float = 1.0
+    damping: float = 0.0
+    projector: Projector = "exact"
+    rank_tolerance: float = 1e-6
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        for name in ("gain", "damping", "rank_tolerance"):
+            if not 0 <= getattr(self, name) < np.inf:
+                raise DikbenchError(f"joint-centering: {name} must be finite and at least 0")
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        task = problem.primary
+        inverse = DampedInverse(task.J, self.rank_tolerance, self.damping)
+        v = inverse.times(task.V)
+        to_middle = distance_to_middle(problem.limits)
+        if to_middle is None:
+            return v
+        centring = self.gain * to_middle
+        v += centring - inverse.taken(self.projector).dot(centring)
+        return v
+
+
+def distance_to_middle(limits: Limits) -> Array | None:
+    """q_mid - q [rad or m], (nv,), 0 where a joint has not both limits; None: none in force."""
+    if limits.joint.middle is None or limits.coordinates is None:
+        return None
+    distance: Array = limits.joint.middle - limits.coordinates
+    distance[np.isnan(distance)] = 0.0
+    return distance

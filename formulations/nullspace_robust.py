@@ -1,0 +1,61 @@
+"""Singularity-robust task priority."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dikbench.array import Array
+from dikbench.errors import DikbenchError
+from dikbench.linear_algebra import DampedInverse, Projector, scaled_identity
+from dikbench.problem import DikProblem, Solve
+
+
+@dataclass(frozen=True)
+class NullspaceRobust:
+    """Task priority without algorithmic singularities: invert each task alone, then project.
+
+        v = sum_k N_(k-1) J_k^# V_k,   two levels:  v = J_1^# V_1 + (I - J_1^+ J_1) J_2^# V_2
+
+    over the priority levels k = 1, 2, ...; N_(k-1) projects into the null space of all levels above
+    k, stacked (N_k as in `nullspace`, with its two projectors); J_k (m_k, nv) and V_k (m_k,) are
+    level k's, poses in the task frame; J^# = J^T (J J^T + lambda^2 I)^-1; v in rad/s. Stays
+    bounded where two tasks become dependent (`nullspace` does not), and pays with the lower
+    task, which it does exactly only where their row spaces are orthogonal; with the exact projector
+    the tasks above are never disturbed. A task's own singularities need damping; knows no limits;
+    weights play no part.
+
+    Attributes:
+        damping: lambda, unsquared (units of J); 0 by default.
+        projector: whether what a task leaves free is computed without damping or with it.
+        rank_tolerance: singular values up to this count as zero (absolute, units of J_k).
+
+    Source: Chiaverini (1997), Singularity-robust task-priority redundancy resolution for real-time
+    kinematic control of robot manipulators [Chiaverini1997]; more than two levels with the
+    projector of all levels above: Antonelli (2009) [Antonelli2009].
+    """
+
+    damping: float = 0.0
+    projector: Projector = "exact"
+    rank_tolerance: float = 1e-6
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        for name in ("damping", "rank_tolerance"):
+            if not 0 <= getattr(self, name) < np.inf:
+                raise DikbenchError(f"nullspace-robust: {name} must be finite and at least 0")
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        first, *others = problem.levels
+        inverse = DampedInverse(first.J, self.rank_tolerance, self.damping)
+        v = inverse.times(first.V)
+        N = scaled_identity(problem.robot.nv, 1.0)
+        for number, level in enumerate(others, start=2):
+            N = N - inverse.taken(self.projector)
+            alone = DampedInverse(level.J, self.rank_tolerance, self.damping)
+            v = v + N.dot(alone.times(level.V))
+            if number <= len(others):  # what this level takes is of use to those below it
+                inverse = DampedInverse(level.J.dot(N), self.rank_tolerance, self.damping)
+        return v

@@ -1,0 +1,48 @@
+"""A correction towards the second task that forgets the first: not a priority."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dikbench.array import Array
+from dikbench.errors import DikbenchError
+from dikbench.linear_algebra import pseudo_inverse
+from dikbench.problem import DikProblem, Solve
+
+
+@dataclass(frozen=True)
+class NullspaceUnprojected:
+    """Correct towards each lower task in turn: does NOT protect the first task.
+
+        v_1 = J_1^+ V_1,   v_k = v_(k-1) + J_k^+ (V_k - J_k v_(k-1))
+
+    over the priority levels k = 1, 2, ...; J_k (m_k, nv) and V_k (m_k,) are level k's, poses in the
+    task frame; v in rad/s. Lecture notes give it for two levels as a form of null-space projection,
+    which it is only where the row spaces of the tasks are orthogonal: nothing keeps the correction
+    out of the tasks above. The lowest task is done exactly, and with a posture as the lowest task
+    the first is forgotten. It is here as the mistake that it is; knows no limits; weights play
+    no part.
+
+    Attributes:
+        rank_tolerance: singular values of J_k up to this count as zero (absolute, units of J_k).
+
+    Source: lecture notes on differential inverse kinematics, "null space projection", first form;
+    compare Chiaverini (1997) [Chiaverini1997].
+    """
+
+    rank_tolerance: float = 1e-6
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        if not 0 <= self.rank_tolerance < np.inf:
+            raise DikbenchError("nullspace-unprojected: rank_tolerance must be finite, at least 0")
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        v = np.zeros(problem.robot.nv)
+        for level in problem.levels:
+            missing = level.V - level.J.dot(v)
+            v = v + pseudo_inverse(level.J, self.rank_tolerance).dot(missing)
+        return v

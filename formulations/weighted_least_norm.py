@@ -1,0 +1,67 @@
+"""The weighted least-norm solution, which spares joints on their way to a limit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dikbench.array import Array
+from dikbench.errors import DikbenchError
+from dikbench.linear_algebra import DampedInverse
+from dikbench.problem import DikProblem, Solve
+
+
+@dataclass(frozen=True)
+class WeightedLeastNorm:
+    """Weighted least norm: let those joints do the task that are not on their way to a limit.
+
+        min v^T W v  s.t.  J v = V,   v = W^-1 J^T (J W^-1 J^T + lambda^2 I)^-1 V,   W = diag(w)
+        w_i = 1 + |dH/dq_i| if v_prev,i dH/dq_i > 0, else 1
+        H = sum_i (q_max,i - q_min,i)^2 / (4 (q_max,i - q_i) (q_i - q_min,i))
+
+    J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s, v_prev what was
+    applied before (unknown: w = 1). From the limit outwards w is infinite; w = 1 for a joint that
+    has not both limits. Does the task exactly and pushes no joint away from its limit, unlike
+    `joint-centering`; the switch makes v jump where a joint turns round, a joint that stands at
+    its limit is free to pass it, and a square J leaves nothing to choose. Keeps no limit;
+    other tasks and weights play no part.
+
+    Attributes:
+        damping: lambda, unsquared (units of J); 0 by default: the task exactly.
+        rank_tolerance: singular values of J W^-1/2 up to this count as zero (absolute, units of J).
+
+    Source: Chan & Dubey (1995), A weighted least-norm solution based scheme for avoiding joint
+    limits for redundant joint manipulators [Chan1995].
+    """
+
+    damping: float = 0.0
+    rank_tolerance: float = 1e-6
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        for name in ("damping", "rank_tolerance"):
+            if not 0 <= getattr(self, name) < np.inf:
+                raise DikbenchError(f"weighted-least-norm: {name} must be finite and at least 0")
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        task, limits = problem.primary, problem.limits
+        to_lower, to_upper = limits.to_lower, limits.to_upper
+        if to_lower is None or to_upper is None or problem.v_prev is None:
+            return DampedInverse(task.J, self.rank_tolerance, self.damping).times(task.V)
+        root = np.sqrt(mobility(to_lower, to_upper, problem.v_prev))
+        v = DampedInverse(task.J * root, self.rank_tolerance, self.damping).times(task.V)
+        return root * v
+
+
+def mobility(to_lower: Array, to_upper: Array, v_prev: Array) -> Array:
+    """1/w, (nv,), from the distances to the limits and the motion before, (nv,) each."""
+    with np.errstate(invalid="ignore"):  # infinite distances
+        outwards = v_prev * (to_lower - to_upper) > 0
+        room = 4 * (to_lower * to_upper) ** 2
+        slope = (to_lower + to_upper) ** 2 * np.abs(to_lower - to_upper)  # |dH/dq| times room
+        share = room / (room + slope)
+    share[(to_lower <= 0) | (to_upper <= 0)] = 0.0
+    limited = np.isfinite(to_lower) & np.isfinite(to_upper)
+    return np.where(outwards & limited, share, 1.0)
