@@ -135,7 +135,7 @@ def _share_of(steps: Mask, motion: Motion) -> float:
 
 
 def _last(values: Array) -> float:
-    return float(values[-1])
+    return float(values[-1]) if len(values) else float("nan")
 
 
 _INF = float("inf")
@@ -173,6 +173,21 @@ METRICS: Mapping[str, Metric] = MappingProxyType(
                 "orientation_error_final_rad", "rad", "low", _INF, "tracking error",
                 "angle between the task frame and its target at the end",
                 lambda m: _last(m.orientation_error),
+            ),
+            Metric(
+                "second_task_error_rms", "", "low", _INF, "tracking error",
+                "root mean square error of the second task [m, rad], where there is one",
+                lambda m: _rms(m.second_task_error),
+            ),
+            Metric(
+                "second_task_error_final", "", "low", _INF, "tracking error",
+                "error of the second task [m, rad] at the end, where there is one",
+                lambda m: _last(m.second_task_error),
+            ),
+            Metric(
+                "path_length_m", "m", "low", _INF, "tracking error",
+                "length of the way that the origin of the task frame went",
+                lambda m: float(np.linalg.norm(np.diff(m.translations, axis=0), axis=1).sum()),
             ),
             Metric(
                 "off_course_max_rad", "rad", "low", np.pi, "tracking error",

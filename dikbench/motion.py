@@ -12,6 +12,7 @@ import pinocchio as pin
 from dikbench.array import Array
 from dikbench.kinematics import Kinematics
 from dikbench.scenario import Scenario
+from dikbench.tasks import PostureTask
 from dikbench.trace import Trace
 
 STRIDE: Final = 16
@@ -28,6 +29,7 @@ class Motion:
     Attributes:
         trace: the trace.
         scenario: the case that it is a trace of.
+        translations: origin of the task frame in the world, (n + 1, 3) [m].
         position_error: distance of the task frame from its target, (n + 1,) [m]; NaN where the
             task is about the orientation only.
         orientation_error: angle between them, (n + 1,) [rad]; NaN where the task is about the
@@ -37,6 +39,7 @@ class Motion:
 
     trace: Trace
     scenario: Scenario
+    translations: Array
     position_error: Array
     orientation_error: Array
     jacobians: Array
@@ -46,6 +49,22 @@ class Motion:
         """Twist of the task frame under the applied velocity, (n, m) [m/s; rad/s]."""
         twists: Array = np.einsum("kij,kj->ki", self.jacobians[:-1], self.trace.applied)
         return twists
+
+    @cached_property
+    def second_task_error(self) -> Array:
+        """Norm of the error of the second tasks, (n + 1,) [their units]; empty where there is none.
+
+        Postures do not count: they only choose where a redundant arm has a choice.
+        """
+        second = [task for task in self.scenario.tasks if not isinstance(task, PostureTask)]
+        if not second:
+            return np.empty(0)
+        kinematics, norms = Kinematics(self.scenario.robot), []
+        for q in self.trace.q:
+            kinematics.update(q)
+            errors = [task.linearize(kinematics).error for task in second]
+            norms.append(float(np.linalg.norm(np.concatenate(errors))))
+        return np.array(norms)
 
     @cached_property
     def sigma_min(self) -> float:
@@ -117,6 +136,7 @@ def recompute(trace: Trace, scenario: Scenario, jacobians: Array | None = None) 
     return Motion(
         trace=trace,
         scenario=scenario,
+        translations=X[:, :3, 3],
         position_error=(
             np.linalg.norm(X[:, :3, 3] - wanted_translations, axis=1)
             if rows[0] < 3

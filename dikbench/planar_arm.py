@@ -22,7 +22,8 @@ def planar_arm(
         position_limit: lower and upper, of every joint [rad].
 
     Returns:
-        A Pinocchio model with the frame `tip` at the end of the last link. Every link weighs
+        A Pinocchio model with the frames `link1`, ... at the end of each link and `tip` at the end
+        of the last one. Every link weighs
         1 kg, spread evenly along it.
     """
     model = pin.Model()
@@ -46,5 +47,6 @@ def planar_arm(
             pin.SE3(pin.utils.rotate("y", np.pi / 2), np.array([length / 2, 0.0, 0.0])),
         )
         placement = pin.SE3(np.eye(3), np.array([length, 0.0, 0.0]))
+        model.addFrame(pin.Frame(f"link{number}", parent, 0, placement, pin.FrameType.OP_FRAME))
     model.addFrame(pin.Frame("tip", parent, 0, placement, pin.FrameType.OP_FRAME))
     return model

@@ -41,13 +41,22 @@ class Crossing:
 CROSSINGS: Mapping[str, Crossing] = MappingProxyType(
     {
         "ur5": Crossing((0.0, -1.2, 1.4, -1.7, -1.4, 0.2), 0),
+        "ur3": Crossing((0.0, -1.2, 1.4, -1.7, -1.4, 0.2), 0),
+        "ur10": Crossing((0.0, -1.2, 1.4, -1.7, -1.4, 0.2), 3),
+        "xarm7": Crossing((0.0, -0.5, 0.0, 1.0, 0.0, 1.3, 0.0), 3),
+        "tiago": Crossing((1.4, -0.4, -1.2, 1.5, 0.0, -0.5, 0.4), 4),
+        "talos": Crossing((-0.4, 0.9, 0.6, -1.5, 0.5, 0.5, -0.1), 5),
+        "lwr": Crossing((0.0, 0.8, 0.8, 0.8, 0.8, 0.8, 0.0), 3),
+        "planar3r": Crossing((0.3, 1.6, 0.6), 2),
         "panda": Crossing((0.0, -0.3, 0.0, -1.8, 0.0, 0.0, pi / 4), 5),
     }
 )
 
 
 def joint_limit_crossing(
-    robot: Literal["ur5", "panda"] = "ur5",
+    robot: Literal[
+        "ur5", "panda", "ur3", "ur10", "xarm7", "tiago", "talos", "lwr", "planar3r"
+    ] = "ur5",
     *,
     approach: float = 0.3,
     depth: float = 0.2,
@@ -61,7 +70,9 @@ def joint_limit_crossing(
 
     One joint j moves as q_j(t) = q_max,j - approach + (approach + depth) sin^2(pi t/T), the others
     stand still, and the task frame is asked to follow: the target is out of reach, by this posture,
-    while q_j is beyond its limit. The UR5 crosses with its base, the Panda with joint 6.
+    while q_j is beyond its limit. UR3 and UR5 cross with their base, the UR10 with joint 4, the
+    Panda and Talos with joint 6, TIAGo with joint 5, xArm7 and LWR with their elbow, the planar arm
+    with its last joint.
     A seed moves the other joints by up to 0.1 rad.
 
     Provokes: a path that leads out of a joint's range
@@ -69,7 +80,7 @@ def joint_limit_crossing(
     Shows in: position_violation_max_rad, off_course_max_rad
 
     Args:
-        robot: ur5 or panda.
+        robot: one of those above.
         approach: how far inside the limit the motion starts [rad], 0.02 to 3.
         depth: how far beyond the limit it goes [rad], 0.02 to 0.5.
         speed: peak speed of the joint over its limit, 0.05 to 1.

@@ -1,0 +1,108 @@
+"""A base that turns and goes at once, with an orientation that hardly counts."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import Any, Literal
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.array import Array
+from dikbench.certificate import Certificate, Claim
+from dikbench.oracle import joint_oracle
+from dikbench.references import Reference
+from dikbench.robot_catalogue import load_robot
+from dikbench.scenario import Scenario
+from dikbench.tasks import PoseTask
+from dikbench.variation import Variation
+from scenarios.common import between, placement_of, positive, samples
+
+VARIATION = Variation(start=0.05, timing=0.1)
+
+
+def log_derivative_drift(
+    robot: Literal["base"] = "base",
+    *,
+    distance: float = 0.2,
+    turn: float = -0.9 * pi,
+    orientation_cost: float = 1e-5,
+    gain: float = 5.0,
+    dt: float = 0.01,
+    hold: float = 2.0,
+    seed: int = 0,
+) -> Scenario:
+    """A square wave of poses for a mobile base: back by `distance`, turned by `turn`, and again.
+
+    The target is the origin for `hold` seconds, then x = -distance with a yaw of `turn`, then the
+    origin and the other once more; position has a cost of 1, orientation one of `orientation_cost`
+    (a weight is a cost squared). A law that leaves the derivative of the logarithm out swings wide
+    where damping competes with the small weight; with it the base goes straight. The ideal length
+    of the way is three times the distance. A seed moves the start by up to 0.05 (m, rad) and
+    changes the times by up to 10 %.
+
+    Provokes: detours of laws that leave out the derivative of the logarithm
+
+    Shows in: path_length_m
+
+    Args:
+        robot: base.
+        distance: between the two poses [m], 0.05 to 1.
+        turn: yaw between them [rad], -3 to 3 (not pi, where the logarithm is cut).
+        orientation_cost: beside a cost of 1 of the position, 1e-6 to 1.
+        gain: of the tracking task, 1/s.
+        dt: control period [s].
+        hold: how long each pose is wanted [s].
+        seed: 0 perturbs nothing.
+
+    Source: Caron's note on the logarithm's derivative in Pink (a planar base that drifts).
+    """
+    positive("log-derivative-drift", gain=gain, dt=dt, hold=hold)
+    between("log-derivative-drift", "distance", distance, 0.05, 1.0)
+    between("log-derivative-drift", "turn", turn, -3.0, 3.0)
+    between("log-derivative-drift", "orientation_cost", orientation_cost, 1e-6, 1.0)
+    base, change = load_robot(robot), VARIATION.drawn(seed)
+    period = hold * change.pace
+    q0 = change.posture(base, base.q0)
+    there = pin.integrate(base.model, base.q0, np.zeros(3))
+    there[:] = [-distance, 0.0, np.cos(turn), np.sin(turn)]
+    poses = (placement_of(base, base.q0), placement_of(base, there))
+
+    def placement(tau: float) -> Any:
+        return poses[int(tau / period + 1e-9) % 2]
+
+    zero = np.zeros(6)
+    reference = Reference(4 * period, placement, lambda tau: zero, moving=False)
+
+    def straight(tau: float) -> Array:
+        """Each leg as a constant motion in x and yaw, in half of the time that it has."""
+        leg = min(int(tau / period), 3)
+        if leg == 0:
+            return base.q0
+        share = min(2 * (tau / period - leg), 1.0)
+        along = share if leg % 2 else 1.0 - share
+        yaw = along * turn
+        return np.array([-along * distance, 0.0, np.cos(yaw), np.sin(yaw)])
+
+    motion = joint_oracle(base, straight, samples(4 * period, dt))
+    way = np.abs(np.diff(motion.q[:, 0])).sum()
+    between_poses = pin.log6(poses[0].actInv(poses[1])).np
+    certificate = Certificate(
+        (
+            Claim("length of the straight way over the distance", way / distance, 2.99, 3.01),
+            Claim("yaw between the poses [rad]", abs(between_poses[5]), 0.5, 3.0),
+            Claim("weight of the orientation", orientation_cost**2, at_most=1e-4),
+        )
+    )
+    return Scenario(
+        robot=base,
+        q0=q0,
+        v0=np.zeros(3),
+        reference=reference,
+        tracking=PoseTask(gain=gain, weight=np.array([1.0, 1.0, orientation_cost**2])),
+        dt=dt,
+        duration=4 * period,
+        certificate=certificate,
+        motion=motion,
+        variation=VARIATION,
+    )

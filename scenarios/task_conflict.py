@@ -1,0 +1,166 @@
+"""Two tasks that cannot both be done: the hand's, and a point's on the elbow."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import pi
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.array import Array
+from dikbench.certificate import Certificate, Claim
+from dikbench.kinematics import Kinematics
+from dikbench.linear_algebra import null_space
+from dikbench.oracle import joint_oracle
+from dikbench.references import joint_path
+from dikbench.robot import Robot
+from dikbench.robot_catalogue import load_robot
+from dikbench.scenario import Scenario
+from dikbench.tasks import PoseTask, PositionTask, TrackingTask
+from dikbench.variation import Variation
+from scenarios.common import between, limits_in_force, positive, samples
+
+
+@dataclass(frozen=True)
+class Conflict:
+    """Where a robot's two tasks meet.
+
+    Attributes:
+        start: posture at the beginning and the end of the motion, (nv,) [rad].
+        middle: posture half way, in which the second task adds nothing that the first leaves free.
+        elbow: the frame of the second task.
+        offset: from the elbow at the start to where it is wanted [m].
+        whole_pose: whether the first task is a pose, else a position.
+    """
+
+    start: tuple[float, ...]
+    middle: tuple[float, ...]
+    elbow: str
+    offset: tuple[float, float, float]
+    whole_pose: bool
+
+
+CONFLICTS: Mapping[str, Conflict] = MappingProxyType(
+    {
+        # Elbow and hand on one line half way: the hand pulls the elbow along.
+        "planar4r": Conflict((0.5, 0.6, 0.4, 1.0), (0.3, 0.6, 0.4, 0.0), "link2", (0, 0, 0), False),
+        # Four rows for three joints: the elbow can never follow by itself.
+        "planar3r": Conflict((0.4, 0.8, 0.9), (0.4, 0.8, 0.0), "link2", (0.1, -0.1, 0), False),
+        # The elbow is wanted farther from the shoulder than it can be.
+        "panda": Conflict(
+            (0, -pi / 4, 0, -3 * pi / 4, 0, pi / 2, pi / 4),
+            (0.2, -pi / 4, 0, -3 * pi / 4 + 0.2, 0, pi / 2, pi / 4),
+            "panda_link4",
+            (-0.2, 0.1, 0.15),
+            True,
+        ),
+    }
+)
+
+VARIATION = Variation(start=0.05, timing=0.1)
+
+
+def task_conflict(
+    robot: Literal["planar4r", "planar3r", "panda"] = "planar4r",
+    *,
+    speed: float = 0.3,
+    gain: float = 5.0,
+    second_gain: float = 2.0,
+    dt: float = 0.01,
+    acceleration: bool = False,
+    seed: int = 0,
+) -> Scenario:
+    """A hand that moves on, and an elbow that is wanted elsewhere: priorities are put to the test.
+
+    The joints move as q(t) = q_a + (q_b - q_a) sin^2(pi t/T) and the hand is asked to follow, with
+    its position (planar arms) or its pose (Panda); the elbow's point, of second priority, is wanted
+    at a fixed place. Half way the second task has less rank in what the first leaves free than by
+    itself, rank(J_2 N_1) < rank J_2: on planar4r elbow and hand are on one line then, on planar3r
+    and the Panda there are too few joints throughout. A seed moves the start by up to 0.05 rad and
+    changes the duration by up to 10 %.
+
+    Provokes: algorithmic singularities, and second tasks that leak into the first
+
+    Shows in: position_error_max_m, second_task_error_rms, velocity_peak_ratio
+
+    Args:
+        robot: planar4r, planar3r or panda.
+        speed: peak of the motion's own speed over the velocity limits, 0.05 to 0.9.
+        gain: of the tracking task, 1/s.
+        second_gain: of the elbow's task, 1/s.
+        dt: control period [s].
+        acceleration: whether acceleration limits are in force.
+        seed: 0 perturbs nothing.
+
+    Source: Chiaverini 1997 (algorithmic singularities).
+    """
+    positive("task-conflict", gain=gain, second_gain=second_gain, dt=dt)
+    between("task-conflict", "speed", speed, 0.05, 0.9)
+    arm = limits_in_force(load_robot(robot), acceleration=acceleration)
+    where, change = CONFLICTS[robot], VARIATION.drawn(seed)
+    middle = np.array(where.middle)
+    start = change.posture(arm, np.array(where.start))
+    way = middle - start
+    assert arm.limits.velocity is not None
+    # The rate of sin^2(pi t/T) peaks at pi/T.
+    duration = pi * float((np.abs(way) / arm.limits.velocity.upper).max()) / speed * change.pace
+
+    def q_r(tau: float) -> Array:
+        q: Array = pin.integrate(arm.model, start, np.sin(pi * tau / duration) ** 2 * way)
+        return q
+
+    def v_r(tau: float) -> Array:
+        v: Array = pi / duration * np.sin(2 * pi * tau / duration) * way
+        return v
+
+    tracking: TrackingTask = PoseTask(gain=gain) if where.whole_pose else PositionTask(gain=gain)
+    kinematics = Kinematics(arm)
+    kinematics.update(start)
+    elbow = kinematics.placement(arm.model.getFrameId(where.elbow)).translation
+    second = PositionTask(
+        target=elbow + np.array(where.offset), gain=second_gain, frame=where.elbow, priority=2
+    )
+    motion = joint_oracle(arm, q_r, samples(duration, dt), tracking)
+    free, alone, apart = _conflict(arm, motion.q[len(motion.q) // 2], tracking, second)
+    certificate = Certificate(
+        (
+            Claim("smallest singular value of J_2 N_1 half way (m)", free, at_most=1e-3),
+            Claim("smallest singular value of J_2 itself (m)", alone, at_least=0.01),
+            Claim("error of the elbow, the hand on its way [m]", apart, at_least=0.02),
+            Claim("smallest singular value of the hand's task", motion.sigma_min.min(), 0.02),
+            Claim("position margin [rad]", motion.margin.min(), at_least=0.05),
+            Claim("required speed over limit", motion.peak_speed_ratio, 0.8 * speed, 1.2 * speed),
+        )
+    )
+    return Scenario(
+        robot=arm,
+        q0=start,
+        v0=v_r(0.0),
+        reference=joint_path(arm, q_r, v_r, duration),
+        tracking=tracking,
+        dt=dt,
+        duration=duration,
+        certificate=certificate,
+        tasks=(second,),
+        motion=motion,
+        variation=VARIATION,
+    )
+
+
+def _conflict(
+    arm: Robot, q: Array, tracking: TrackingTask, second: PositionTask
+) -> tuple[float, float, float]:
+    """At q: the last of rank J_2 singular values of J_2 N_1 and of J_2; the elbow's error."""
+    kinematics = Kinematics(arm)
+    kinematics.update(q)
+    first = tracking.linearize(kinematics, kinematics.placement(arm.frame_id).copy())
+    task = second.linearize(kinematics)
+    singular = np.linalg.svd(task.J, compute_uv=False)
+    rank = int(np.count_nonzero(singular > 1e-3))
+    left = np.linalg.svd(task.J @ null_space(first.J, 1e-6), compute_uv=False)
+    free = float(left[rank - 1]) if len(left) >= rank else 0.0
+    return free, float(singular[rank - 1]), float(np.linalg.norm(task.error))
