@@ -22,10 +22,10 @@ class WeightedLeastNorm:
 
     J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s, v_prev what was
     applied before (unknown: w = 1). From the limit outwards w is infinite; w = 1 for a joint that
-    has not both limits. Does the task exactly and pushes no joint away from its limit, unlike
-    `joint-centering`; the switch makes v jump where a joint turns round, a joint that stands at
-    its limit is free to pass it, and a square J leaves nothing to choose. Keeps no limit;
-    other tasks and weights play no part.
+    has not both limits. Does the task exactly where the other joints can, and pushes no joint away
+    from its limit, unlike `joint-centering`; v jumps where a joint turns round, a joint at rest is
+    free to pass its limit, and a square J leaves nothing to choose. Keeps no limit; other tasks and
+    weights play no part.
 
     Attributes:
         damping: lambda, unsquared (units of J); 0 by default: the task exactly.
