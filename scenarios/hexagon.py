@@ -55,7 +55,7 @@ class SetUp:
 
 SET_UPS: Mapping[str, SetUp] = MappingProxyType(
     {
-        "lwr": SetUp((0.0, pi / 4, pi / 4, pi / 4, 0.0, 0.0, 0.0), (0.1, 0.35, 0.6235), 5.0),
+        "lwr": SetUp((0.0, pi / 4, pi / 4, pi / 4, 0.0, 0.0, 0.0), (0.1, 0.35, 0.6235), 4.0),
         "planar4r": SetUp((0.0, pi / 2, -pi / 2, pi / 2), (0.7, 0.0, 0.0), 1.4),
     }
 )

@@ -85,9 +85,10 @@ def joint_limit_approach(
         return q
 
     motion = joint_oracle(arm, q_r, samples(duration, dt))
+    room = float(position.upper[j] - motion.q[0][j])
     certificate = Certificate(
         (
-            Claim("room before the limit over the braking distance", motion.margin[0] / braking, 1),
+            Claim("room before the limit over the braking distance", room / braking, 1.0),
             Claim("deepest margin of the motion [rad]", motion.margin.min(), at_most=-0.8 * depth),
             Claim("smallest singular value (m, rad)", motion.sigma_min.min(), at_least=0.03),
             Claim("required speed over limit", motion.peak_speed_ratio, 0.9 * speed, 0.999),

@@ -18,7 +18,7 @@ from dikbench.tasks import PoseTask
 from dikbench.variation import Variation
 from scenarios.common import between, placement_of, positive, samples
 
-VARIATION = Variation(start=0.05, timing=0.1)
+VARIATION = Variation(start=0.05, direction=0.5, timing=0.1)
 
 
 def log_derivative_drift(
@@ -38,8 +38,8 @@ def log_derivative_drift(
     origin and the other once more; position has a cost of 1, orientation one of `orientation_cost`
     (a weight is a cost squared). A law that leaves the derivative of the logarithm out swings wide
     where damping competes with the small weight; with it the base goes straight. The ideal length
-    of the way is three times the distance. A seed moves the start by up to 0.05 (m, rad) and
-    changes the times by up to 10 %.
+    of the way is three times the distance. A seed moves the start by up to 0.05 (m, rad), turns the
+    direction in which the second pose lies by up to 0.5 rad and changes the times by up to 10 %.
 
     Provokes: detours of laws that leave out the derivative of the logarithm
 
@@ -64,8 +64,8 @@ def log_derivative_drift(
     base, change = load_robot(robot), VARIATION.drawn(seed)
     period = hold * change.pace
     q0 = change.posture(base, base.q0)
-    there = pin.integrate(base.model, base.q0, np.zeros(3))
-    there[:] = [-distance, 0.0, np.cos(turn), np.sin(turn)]
+    back = change.rotation(base) @ np.array([-distance, 0.0, 0.0])
+    there = np.array([back[0], back[1], np.cos(turn), np.sin(turn)])
     poses = (placement_of(base, base.q0), placement_of(base, there))
 
     def placement(tau: float) -> Any:
@@ -82,10 +82,10 @@ def log_derivative_drift(
         share = min(2 * (tau / period - leg), 1.0)
         along = share if leg % 2 else 1.0 - share
         yaw = along * turn
-        return np.array([-along * distance, 0.0, np.cos(yaw), np.sin(yaw)])
+        return np.array([along * back[0], along * back[1], np.cos(yaw), np.sin(yaw)])
 
     motion = joint_oracle(base, straight, samples(4 * period, dt))
-    way = np.abs(np.diff(motion.q[:, 0])).sum()
+    way = np.linalg.norm(np.diff(motion.q[:, :2], axis=0), axis=1).sum()
     between_poses = pin.log6(poses[0].actInv(poses[1])).np
     certificate = Certificate(
         (

@@ -46,8 +46,10 @@ class Conflict:
 
 CONFLICTS: Mapping[str, Conflict] = MappingProxyType(
     {
-        # Elbow and hand on one line half way: the hand pulls the elbow along.
-        "planar4r": Conflict((0.5, 0.6, 0.4, 1.0), (0.3, 0.6, 0.4, 0.0), "link2", (0, 0, 0), False),
+        # Elbow and hand on one line half way, the elbow wanted farther back than that allows.
+        "planar4r": Conflict(
+            (0.5, 0.6, 0.4, 1.0), (0.3, 0.6, 0.4, 0.0), "link2", (-0.065, -0.135, 0), False
+        ),
         # Four rows for three joints: the elbow can never follow by itself.
         "planar3r": Conflict((0.4, 0.8, 0.9), (0.4, 0.8, 0.0), "link2", (0.1, -0.1, 0), False),
         # The elbow is wanted farther from the shoulder than it can be.

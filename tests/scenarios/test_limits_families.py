@@ -1,0 +1,201 @@
+"""Approaches to limits, starts outside them, and a goal behind one: what they claim and provoke."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from math import pi
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from dikbench.errors import DikbenchError
+from dikbench.kinematics import Kinematics
+from dikbench.registry import make_scenario
+from scenarios.start_outside import JOINTS
+
+Metrics = Callable[..., dict[str, float]]
+
+# --- approach at speed
+
+
+@pytest.mark.parametrize("joint", ["pan", "wrist_3"])
+@pytest.mark.parametrize("robot", ["ur3", "ur5", "ur10"])
+@pytest.mark.parametrize("deceleration", [2.0, 5.0, 20.0])
+def test_an_approach_leaves_room_to_brake_and_no_more(
+    robot: str, joint: str, deceleration: float
+) -> None:
+    """1.25 braking distances v^2/(2 a), at 0.9 of the joint's speed, to `depth` beyond."""
+    scenario = make_scenario(
+        f"joint-limit-approach[robot={robot},joint={joint},deceleration={deceleration}]"
+    )
+    arm, j = scenario.robot, {"pan": 0, "wrist_3": 5}[joint]
+    position, velocity, acceleration = (
+        arm.limits.position,
+        arm.limits.velocity,
+        arm.limits.acceleration,
+    )
+    assert position is not None
+    assert velocity is not None
+    assert acceleration is not None
+    assert np.all(acceleration.upper == deceleration)
+    assert scenario.v0[j] == pytest.approx(0.9 * velocity.upper[j])
+    room = position.upper[j] - scenario.q0[j]
+    braking = scenario.v0[j] ** 2 / (2 * deceleration)
+    assert room == pytest.approx(max(1.25 * braking, 0.3))
+    end = scenario.q0 + scenario.duration * scenario.v0
+    assert end[j] == pytest.approx(position.upper[j] + 0.2)
+    assert np.count_nonzero(scenario.v0) == 1
+
+
+@pytest.mark.parametrize("deceleration", [2.0, 20.0])
+def test_looking_one_step_ahead_brakes_too_late(metrics: Metrics, deceleration: float) -> None:
+    """`one-step` gives the acceleration limit up, `viable` keeps both, `pinv` runs through."""
+    scenario = make_scenario(f"joint-limit-approach[deceleration={deceleration}]")
+    hasty, viable, blind = (
+        metrics(law, scenario) for law in ("qp[braking=one-step]", "qp[braking=viable]", "pinv")
+    )
+    assert hasty["position_violation_max_rad"] < 1e-6
+    assert hasty["acceleration_violation_max_rad_s2"] > 5 * deceleration
+    assert viable["position_violation_max_rad"] < 1e-6
+    assert viable["acceleration_violation_max_rad_s2"] < 1e-3
+    assert blind["position_violation_max_rad"] == pytest.approx(0.2, abs=0.02)
+
+
+def test_an_approach_without_room_or_without_limit_does_not_certify(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A limit that is out of reach, and a start nearer than the robot can brake."""
+    module = sys.modules["scenarios.joint_limit_approach"]
+    load = module.load_robot
+    far = load("ur5").limits.position
+    lower, upper = far.lower.copy(), far.upper.copy()
+    upper[0] = 50.0
+
+    class _Blunt:
+        """The UR5 whose path ends where the limit used to be."""
+
+        def with_limits(self, acceleration: float) -> object:
+            arm = load("ur5").with_limits(acceleration=acceleration)
+            moved = arm.with_limits(position=(lower, upper))
+            object.__setattr__(moved, "limits", _Wide(moved.limits, arm.limits))
+            return moved
+
+    class _Wide:
+        """Limits that are far away when they are measured, and near when the path is built."""
+
+        def __init__(self, wide: object, near: object) -> None:
+            self._wide, self._near = wide, near
+
+        def __getattr__(self, name: str) -> object:
+            return getattr(self._near if name == "position" else self._wide, name)
+
+    monkeypatch.setattr(module, "load_robot", lambda name: _Blunt())
+    with pytest.raises(DikbenchError, match="deepest margin of the motion"):
+        make_scenario("joint-limit-approach")
+    monkeypatch.setattr(module, "load_robot", load)
+    monkeypatch.setattr(module, "ROOM", 0.5)
+    with pytest.raises(DikbenchError, match="room before the limit over the braking distance"):
+        make_scenario("joint-limit-approach[deceleration=2]")
+
+
+# --- start outside
+
+
+@pytest.mark.parametrize("robot", JOINTS)
+@pytest.mark.parametrize("outside", [1e-4, 1e-2])
+def test_one_joint_starts_outside_and_the_path_leads_inside(robot: str, outside: float) -> None:
+    """By the distance that was asked for, at the rate that was asked for."""
+    scenario = make_scenario(f"start-outside[robot={robot},outside={outside},rate=0.1]")
+    arm, j = scenario.robot, JOINTS[robot]
+    seen = arm.limits.at(scenario.q0)
+    assert seen.to_upper is not None
+    assert seen.to_lower is not None
+    assert seen.to_upper[j] == pytest.approx(-outside, rel=1e-6)
+    assert np.delete(seen.to_upper, j).min() > 0.05
+    assert seen.to_lower.min() > 0.05
+    inside = scenario.q0.copy()
+    inside[j] -= 0.1
+    kinematics = Kinematics(arm)
+    kinematics.update(inside)
+    X = kinematics.placement(arm.frame_id)
+    error = pin.log6(X.actInv(scenario.reference.placement(1.0))).np
+    assert np.abs(error).max() < 1e-9
+
+
+def test_laws_with_limits_come_inside_at_a_bounded_rate(metrics: Metrics) -> None:
+    """And give up the place that they are to hold; a law without stays outside."""
+    scenario = make_scenario("start-outside[robot=ur5,outside=1e-2,rate=0]")
+    kept, blind = (metrics(law, scenario) for law in ("qp", "pinv"))
+    assert scenario.robot.limits.position is not None
+    assert kept["velocity_peak_ratio"] <= 0.1 + 1e-6
+    assert blind["violating_share"] == 1.0
+    assert kept["violating_share"] < 0.1
+    assert blind["position_error_max_m"] < 1e-6
+
+
+def test_a_start_inside_does_not_certify(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Blunted: the joint stands inside its limit."""
+    module = sys.modules["scenarios.start_outside"]
+    monkeypatch.setattr(module, "between", lambda *given: None)
+    for outside in ("-0.01", "0", "0.1"):
+        with pytest.raises(DikbenchError, match="margin at the start"):
+            make_scenario(f"start-outside[outside={outside}]")
+
+
+# --- greedy trap
+
+
+def test_the_shortest_way_leads_through_the_limit() -> None:
+    """From 0.5 the goal at 5.5 is 1.28 rad away downwards, past 0, and 5 rad upwards."""
+    scenario = make_scenario("greedy-trap")
+    kinematics = Kinematics(scenario.robot)
+    kinematics.update(scenario.q0)
+    error = pin.log6(
+        kinematics.placement(scenario.robot.frame_id).actInv(scenario.reference.placement(0.0))
+    ).np[5]
+    assert error == pytest.approx(5.0 - 2 * pi)
+    assert scenario.q0[0] + error < 0
+    assert scenario.motion is not None
+    assert scenario.motion.q[-1] == pytest.approx([5.5])
+    assert scenario.motion.margin.min() == pytest.approx(0.5)
+    assert scenario.motion.peak_speed_ratio == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("law", ["qp", "lp-alpha", "drake", "hqp", "pink-qp"])
+def test_every_law_that_follows_the_error_sticks(metrics: Metrics, law: str) -> None:
+    """At 0, as far from the goal as the start was from it, less its own way."""
+    found = metrics(law, make_scenario("greedy-trap"))
+    assert found["orientation_error_final_rad"] == pytest.approx(2 * pi - 5.5, abs=1e-2)
+    assert found["position_violation_max_rad"] < 1e-6
+    assert found["stuck_share"] > 0.5
+
+
+def test_a_trap_that_is_none_does_not_certify(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A goal whose shortest way is inside, and one that nothing reaches."""
+    monkeypatch.setattr(sys.modules["scenarios.greedy_trap"], "between", lambda *given: None)
+    with pytest.raises(DikbenchError, match="end of the shortest way"):
+        make_scenario("greedy-trap[start=1,goal=3]")
+    with pytest.raises(DikbenchError, match="margin of the way round"):
+        make_scenario("greedy-trap[start=0.02,goal=5.5]")
+
+
+@pytest.mark.parametrize(
+    ("selector", "parts"),
+    [
+        ("joint-limit-approach[deceleration=1]", ["deceleration=1.0 must be between 2.0 and 50"]),
+        ("joint-limit-approach[joint=elbow]", ["joint='elbow' is not valid", "pan, wrist_3"]),
+        ("joint-limit-approach[robot=panda]", ["robot='panda' is not valid", "ur5, ur3, ur10"]),
+        ("start-outside[outside=0.1]", ["outside=0.1 must be between 0.0001 and 0.01"]),
+        ("start-outside[rate=-1]", ["rate=-1.0 must be between 0.0 and 0.5"]),
+        ("greedy-trap[goal=4]", ["goal=4.0 must be between 4.9 and 6.0"]),
+    ],
+)
+def test_what_cannot_be_is_one_line(selector: str, parts: list[str]) -> None:
+    """The parameter and its range."""
+    with pytest.raises(DikbenchError) as caught:
+        make_scenario(selector)
+    assert "\n" not in str(caught.value)
+    for part in parts:
+        assert part in str(caught.value)
