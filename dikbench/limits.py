@@ -125,6 +125,19 @@ class JointLimits:
             return None
         return 0.1 * self.velocity.upper, -0.1 * self.velocity.lower
 
+    @cached_property
+    def middle(self) -> tuple[Array, Array]:
+        """Which joints have a middle, 1 or 0, and the coordinate there [rad or m], (nv,) each.
+
+        A joint with a position limit on one side or none has no middle (0 stands in for it).
+        """
+        if self.position is None:
+            return np.zeros(self.nv), np.zeros(self.nv)
+        lower, upper = self.position.lower, self.position.upper
+        bounded = np.isfinite(lower) & np.isfinite(upper)
+        half = np.add(lower / 2, upper / 2, out=np.zeros(self.nv), where=bounded)
+        return bounded.astype(float), half
+
     def at(self, q: Array) -> Limits:
         """The limits as seen from configuration q (nq,)."""
         if self.position is None:

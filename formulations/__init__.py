@@ -10,17 +10,25 @@ from types import MappingProxyType
 
 from dikbench.problem import Formulation
 from formulations.damped_least_squares import DampedLeastSquares
+from formulations.joint_centering import JointCentering
 from formulations.lp_alpha import LpAlpha
 from formulations.lp_alpha_cvxpy import LpAlphaCvxpy
 from formulations.nullspace import Nullspace
+from formulations.nullspace_robust import NullspaceRobust
+from formulations.nullspace_unprojected import NullspaceUnprojected
 from formulations.pseudo_inverse import PseudoInverse
+from formulations.weighted_least_norm import WeightedLeastNorm
 from formulations.weighted_qp import WeightedQp
 
 FORMULATIONS: Mapping[str, type[Formulation]] = MappingProxyType(
     {
         "pinv": PseudoInverse,
         "dls": DampedLeastSquares,
+        "joint-centering": JointCentering,
+        "weighted-least-norm": WeightedLeastNorm,
         "nullspace": Nullspace,
+        "nullspace-robust": NullspaceRobust,
+        "nullspace-unprojected": NullspaceUnprojected,
         "qp": WeightedQp,
         "lp-alpha": LpAlpha,
         "lp-alpha-cvxpy": LpAlphaCvxpy,
