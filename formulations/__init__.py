@@ -17,6 +17,8 @@ from formulations.nullspace import Nullspace
 from formulations.nullspace_robust import NullspaceRobust
 from formulations.nullspace_unprojected import NullspaceUnprojected
 from formulations.pseudo_inverse import PseudoInverse
+from formulations.sns import SaturationInNullSpace
+from formulations.sns_optimal import OptimalSaturationInNullSpace
 from formulations.weighted_least_norm import WeightedLeastNorm
 from formulations.weighted_qp import WeightedQp
 
@@ -29,6 +31,8 @@ FORMULATIONS: Mapping[str, type[Formulation]] = MappingProxyType(
         "nullspace": Nullspace,
         "nullspace-robust": NullspaceRobust,
         "nullspace-unprojected": NullspaceUnprojected,
+        "sns": SaturationInNullSpace,
+        "sns-optimal": OptimalSaturationInNullSpace,
         "qp": WeightedQp,
         "lp-alpha": LpAlpha,
         "lp-alpha-cvxpy": LpAlphaCvxpy,
