@@ -31,7 +31,8 @@ class Nullspace:
             J_k: a relative one explodes where nothing is left free).
         damping: lambda, unsquared (units of J_k).
         projector: what becomes of N_k under damping: `exact` keeps it and protects what the tasks
-            above have got; `damped` puts the damped inverse into it and leaks into them.
+            above have got; `damped` puts the damped inverse into it and leaks into them, the more
+            as the task below inverts what leaks.
 
     Source: [Nakamura1987]; [SicilianoSlotine1991].
     """

@@ -23,9 +23,9 @@ class WeightedLeastNorm:
 
     J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s; v_prev the velocity
     applied last (None: nothing moves, and the law is the pseudo-inverse). At a limit, and outside
-    it, a joint that moves outwards is stopped; a joint without a limit on either side is free. No
-    self-motion without need and no gain to tune, but the weights jump as a joint turns round, and
-    nothing is promised: the stopped joint turns back only when the task asks for it.
+    it, a joint that moves outwards is stopped; before it, one without limits on both sides is free.
+    No self-motion without need and no gain to tune, but the weights jump as a joint turns round,
+    and nothing is promised: the stopped joint turns back only when the task asks for it.
 
     Attributes:
         rank_tolerance: singular values of J W^-1/2 up to this count as zero (absolute).
@@ -56,7 +56,7 @@ class WeightedLeastNorm:
 def limit_gradient(limits: Limits) -> Array:
     """dH/dq_i = (q_max - q_min)^2 (2 q - q_max - q_min) / (4 (q_max - q)^2 (q - q_min)^2), (nv,).
 
-    Infinite, with its sign, at a limit and outside it; 0 where a joint is not limited on both sides.
+    Infinite, with its sign, at a limit and outside it; else 0 where one of the limits is missing.
     """
     below, above = limits.to_lower, limits.to_upper
     assert below is not None
