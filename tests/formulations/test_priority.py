@@ -158,7 +158,7 @@ def test_damped_projector_leaks_what_theory_says(damping: float, leak: float) ->
     """||J (I - J_dls J)|| = max s d^2/(s^2 + d^2) over the singular values s of J.
 
     The robust law does not invert the projector: 4.5e-4, 1.1e-2, 3.8e-2. The strict one does, and
-    with n = d^2/(s^2 + d^2) leaks max s n/(n^2 + d^2), tens of times as much.
+    with n = d^2/(s^2 + d^2) leaks max s n/(n^2 + d^2): 4.3, 2.5, 1.7.
     """
     singular = [1.80753731, 1.6754543, 1.14921852, 0.34169484, 0.30488921, 0.22105995]
     left = [damping**2 / (s**2 + damping**2) for s in singular]
