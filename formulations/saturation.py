@@ -20,6 +20,9 @@ rounding grows by the inverse of the square, and what is above must stay below 1
 ROUNDING = 1e-10
 """A multiplier [rad/s] whose sign is not to be trusted."""
 
+NEGLIGIBLE = 1e-100
+"""A speed [rad/s] that is none: quotients by it stay finite."""
+
 
 class _Held(NamedTuple):
     """The motion that saturated joints leave.
@@ -112,7 +115,7 @@ def _scale(a: Array, b: Array, box: Box, bounds: dict[int, float]) -> tuple[floa
     The scale is -1 where there is none that is not negative. The joint is, among those that are
     outside at s = 1, the one that allows the least; None where none is.
     """
-    moves = a != 0
+    moves = np.abs(a) > NEGLIGIBLE
     inside = (box.lower <= b) & (b <= box.upper)
     low, high = np.where(inside, -np.inf, np.inf), np.where(inside, np.inf, -np.inf)
     np.divide(np.where(a > 0, box.lower, box.upper) - b, a, out=low, where=moves)

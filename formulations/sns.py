@@ -28,10 +28,10 @@ class SaturationInNullSpace:
     were held are free to come off their bounds. A level for which no s fits is left out.
 
     J (m, nv) and V (m,) are each level's, poses in the task frame; v in rad/s. Strict priority
-    with bounds active or not; never off course and inside every limit; finds the largest s almost
-    always, not always. At a singularity it does what the pseudo-inverse does. Where the box
-    excludes rest (outside a limit, or braking) there may be no s for the first task: `Infeasible`.
-    Weights play no part.
+    with bounds active or not; never off course and inside every limit; stops short of the largest
+    s in some states (one in twenty on a Panda asked for too much). At a singularity it does what
+    the pseudo-inverse does. Where the box excludes rest (outside a limit, or braking) there may be
+    no s for the first task: `Infeasible`. Weights play no part.
 
     Attributes:
         braking: how the box approaches a position limit (see `dikbench.box`).

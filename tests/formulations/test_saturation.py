@@ -114,7 +114,8 @@ def test_without_redundancy_three_laws_are_one() -> None:
 def test_with_redundancy_they_part(count: int) -> None:
     """Panda, three times the twist of a joint velocity drawn inside the limits.
 
-    Means of s: scaled pseudo-inverse 0.403, saturation 0.438, linear program 0.439.
+    Means of s: scaled pseudo-inverse 0.403, saturation 0.438, linear program 0.439 (over 5000
+    states 0.408, 0.440, 0.441; saturation is at the program's in 96 % of them).
     """
     problems = arm_states("panda", count, lambda v, _: 3 * v)
     scaled, basic, optimal, lp = scales(problems, "pinv[after=scale]", *SNS, LP)
@@ -170,7 +171,16 @@ def rethink_states(
 def test_share_that_reaches_the_true_scale(m: int, n: int, symmetric: bool, count: int) -> None:
     """Random J (m, n) and box, J v = V/s for a v in the box: who reaches s, and the linear program?
 
-    TABLE
+    5000 states each: share that reaches s, share that reaches the program's, mean and worst
+    distance from it. The program (daqp) reaches s in all of them; symmetric box | asymmetric:
+
+    | law, (m, n) | symmetric | asymmetric |
+    |---|---|---|
+    | pinv[after=scale], (6, 7) | 10.3 %, 1.4 %, .123, .71 | 12.1 %, 1.4 %, .117, .77 |
+    | sns, sns-optimal, (6, 7) | 87.9 %, 85.0 %, .0068, .49 | 91.2 %, 88.3 %, .0048, .49 |
+    | pinv[after=scale], (3, 7) | 31.1 %, 9.3 %, .262, .84 | 33.8 %, 10.5 %, .251, .83 |
+    | sns, (3, 7) | 98.9 %, 89.4 %, .0015, .15 | 99.4 %, 91.1 %, .0009, .12 |
+    | sns-optimal, (3, 7) | 99.5 %, 92.8 %, .0006, .07 | 99.6 %, 93.9 %, .0004, .06 |
     """
     pairs = list(rethink_states(count, m, n, symmetric=symmetric))
     problems, given = [problem for problem, _ in pairs], np.array([s for _, s in pairs])
@@ -210,7 +220,7 @@ def test_saturation_by_hand(law: str) -> None:
 def test_optimal_saturation_is_the_least_motion_where_the_task_is_done() -> None:
     """Where s = 1 fits: min ||v||^2 s.t. J v = V in the box, by its condition of optimality.
 
-    That is v = clip(J^T y, lo, hi) for some y. The basic law misses it in 2 % of the states.
+    That is v = clip(J^T y, lo, hi) for some y. The basic law misses it in 1 % of the states.
     """
     random = np.random.default_rng(0)
     excess: dict[str, list[float]] = {law: [] for law in SNS}
