@@ -28,7 +28,11 @@ quick:           ## the default study
 benchmark:       ## how fast the harness is, against its peers (let nothing else run)
 	$(PYTHON) -m pip install --quiet -e ".[peers,drake]" && $(PYTHON) tests/benchmarks/ratios.py
 
+# Narrower: make mutation MUTANTS="formulations.sns*"; then `python -m mutmut results`, `... browse`.
+mutation:        ## which changes to the laws and limits no test notices (hours; see pyproject.toml)
+	$(PYTHON) -m pip install --quiet mutmut && $(PYTHON) -m mutmut run $(MUTANTS)
+
 constraints:     ## the installed versions become the tested ones
 	.venv/bin/pip freeze --exclude-editable --exclude pip --exclude setuptools > constraints.txt
 
-.PHONY: help setup test test-long lint format contract quick benchmark constraints
+.PHONY: help setup test test-long lint format contract quick benchmark mutation constraints

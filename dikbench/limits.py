@@ -131,12 +131,14 @@ class JointLimits:
 
         A joint with a position limit on one side or none has no middle (0 stands in for it).
         """
-        if self.position is None:
-            return np.zeros(self.nv), np.zeros(self.nv)
-        lower, upper = self.position.lower, self.position.upper
-        bounded = np.isfinite(lower) & np.isfinite(upper)
-        half = np.add(lower / 2, upper / 2, out=np.zeros(self.nv), where=bounded)
-        return bounded.astype(float), half
+        bounded, half = np.zeros(self.nv), np.zeros(self.nv)
+        if self.position is not None:
+            lower, upper = self.position.lower, self.position.upper
+            both = np.isfinite(lower) & np.isfinite(upper)
+            bounded[both] = 1.0
+            half[both] = (lower[both] + upper[both]) / 2
+        bounded.flags.writeable = half.flags.writeable = False
+        return bounded, half
 
     def at(self, q: Array) -> Limits:
         """The limits as seen from configuration q (nq,)."""
