@@ -96,7 +96,7 @@ def _saturated(
 
 
 def _inside(v: Array, box: Box) -> Array:
-    """v without what sticks out of the box, which is rounding; faster than `np.clip`."""
+    """The velocity without what sticks out of the box, which is rounding; faster than `np.clip`."""
     held: Array = np.minimum(np.maximum(v, box.lower), box.upper)
     return held
 
