@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dikbench import DikbenchError, PostureTask, Robot, load_robot, solve_dik
+from dikbench import PostureTask, Robot, load_robot, solve_dik
 from dikbench.array import Array
 from dikbench.kinematics import Kinematics
-from dikbench.registry import make_formulation
 from dikbench.tasks.posture import middle_posture
 from formulations.weighted_least_norm import limit_gradient
 
@@ -154,22 +153,3 @@ def test_joint_without_a_limit_is_never_stiffened() -> None:
     gradient = limit_gradient(robot.limits.at(np.array([1.0, 0.4, 3.0])))
     assert gradient[0] == pytest.approx(16 * 2 / (4 * 1 * 9))
     np.testing.assert_array_equal(gradient[1:], [0.0, 0.0])
-
-
-@pytest.mark.parametrize(
-    ("law", "parameter"),
-    [
-        ("joint-centering", "gain"),
-        ("joint-centering", "damping"),
-        ("weighted-least-norm", "rank_tolerance"),
-        ("nullspace", "damping"),
-        ("nullspace-robust", "damping"),
-        ("nullspace-unprojected", "rank_tolerance"),
-        ("sns", "rank_tolerance"),
-        ("sns-optimal", "rank_tolerance"),
-    ],
-)
-def test_a_negative_parameter_is_one_line(law: str, parameter: str) -> None:
-    """The message names the law, the parameter and what would be valid."""
-    with pytest.raises(DikbenchError, match=f"{law}: {parameter} must be finite and at least 0"):
-        make_formulation(f"{law}[{parameter}=-1]")
