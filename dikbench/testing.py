@@ -21,7 +21,7 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.array import Array
-from dikbench.contract_states import DT, State, states
+from dikbench.contract_states import State, states
 from dikbench.control_step import TrialEnded, control_step
 from dikbench.errors import DikbenchError
 from dikbench.problem import DikProblem, Formulation, LimitKind, program_of, promises_of
@@ -202,41 +202,46 @@ def _compare(first: _Asked, second: _Asked, what: str) -> None:
 
 def check_position_limits(formulation: Formulation, solver: str | None = None) -> None:
     """Where promised: q + v dt is inside the position limits, and no joint outside goes further."""
-    if "position" not in promises_of(formulation):
-        return
-    for state, v, tolerance in _Asked(formulation, solver).verified():
-        limits = state.problem.limits
-        assert limits.to_lower is not None
-        assert limits.to_upper is not None
-        lower, upper = -np.maximum(limits.to_lower, 0) / DT, np.maximum(limits.to_upper, 0) / DT
-        _assert_within(state, "position", v, lower, upper, tolerance)
+    _check_promise("position", formulation, solver)
 
 
 def check_velocity_limits(formulation: Formulation, solver: str | None = None) -> None:
     """Where promised: v is inside the velocity limits."""
-    if "velocity" not in promises_of(formulation):
-        return
-    for state, v, tolerance in _Asked(formulation, solver).verified():
-        limit = state.problem.limits.joint.velocity
-        assert limit is not None
-        _assert_within(state, "velocity", v, limit.lower, limit.upper, tolerance)
+    _check_promise("velocity", formulation, solver)
 
 
 def check_acceleration_limits(formulation: Formulation, solver: str | None = None) -> None:
     """Where promised, in force and not relaxed: (v - v_prev)/dt is inside the limits."""
-    if "acceleration" not in promises_of(formulation):
+    _check_promise("acceleration", formulation, solver)
+
+
+def _check_promise(kind: LimitKind, formulation: Formulation, solver: str | None) -> None:
+    if kind in promises_of(formulation):
+        for state, v, tolerance in _Asked(formulation, solver).verified():
+            _assert_within(state, kind, v, tolerance)
+
+
+def _allowed(problem: DikProblem, kind: LimitKind) -> tuple[Array, Array] | None:
+    """The velocities that a kind of limit allows, (nv,) each; None where it is not in force."""
+    limits, dt = problem.limits, problem.dt
+    if kind == "position":
+        if limits.to_lower is None or limits.to_upper is None:
+            return None
+        return -np.maximum(limits.to_lower, 0) / dt, np.maximum(limits.to_upper, 0) / dt
+    if kind == "velocity":
+        velocity = limits.joint.velocity
+        return None if velocity is None else (velocity.lower, velocity.upper)
+    acceleration, v_prev = limits.joint.acceleration, problem.v_prev
+    if acceleration is None or v_prev is None or problem.relaxed:
+        return None
+    return v_prev + acceleration.lower * dt, v_prev + acceleration.upper * dt
+
+
+def _assert_within(state: State, kind: LimitKind, v: Array, tolerance: float) -> None:
+    allowed = _allowed(state.problem, kind)
+    if allowed is None:
         return
-    for state, v, tolerance in _Asked(formulation, solver).verified():
-        v_prev, limit = state.problem.v_prev, state.problem.limits.joint.acceleration
-        if v_prev is None or limit is None or state.problem.relaxed:
-            continue
-        lower, upper = v_prev + limit.lower * DT, v_prev + limit.upper * DT
-        _assert_within(state, "acceleration", v, lower, upper, tolerance)
-
-
-def _assert_within(
-    state: State, kind: LimitKind, v: Array, lower: Array, upper: Array, tolerance: float
-) -> None:
+    lower, upper = allowed
     excess = np.maximum(lower - v, v - upper)
     worst = int(np.argmax(excess))
     if excess[worst] > tolerance:
@@ -244,6 +249,22 @@ def _assert_within(
             f"{state.label}: joint {worst} passes its {kind} limit: {v[worst]:.9g} rad/s, allowed "
             f"from {lower[worst]:.9g} to {upper[worst]:.9g}"
         )
+
+
+def check_state(formulation: Formulation, state: State, solver: str | None = None) -> None:
+    """At one state of your own making: a velocity inside the promised limits, or `CannotAnswer`.
+
+    For property-based tests; the answer of a solver that is wrong there is not judged.
+
+    Raises:
+        AssertionError: if the law raises, answers with a wrong shape or NaN, or breaks a promise.
+    """
+    answer = _Asked(formulation, solver).answer(state.problem)
+    if answer.status in {Status.FORMULATION_ERROR, Status.WRONG_SHAPE, Status.NOT_FINITE}:
+        raise AssertionError(f"{state.label}: {answer.status.value}: {answer.message}")
+    if answer.velocity is not None and answer.status is Status.OK:
+        for kind in promises_of(formulation):
+            _assert_within(state, kind, answer.velocity, ROUNDING + answer.residual)
 
 
 CHECKS: Final[tuple[Check, ...]] = (

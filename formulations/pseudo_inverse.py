@@ -54,7 +54,4 @@ class PseudoInverse:
             return v
         if self.after == "clip":
             return np.clip(v, limit.lower, limit.upper)
-        # How often the nearer bound fits into each velocity; below 1 the smallest is the scale.
-        bound = np.where(v > 0, limit.upper, -limit.lower)
-        excess = float(np.max(np.abs(v) / np.maximum(bound, np.finfo(float).tiny)))
-        return v / max(1.0, excess)
+        return v / max(1.0, float(limit.usage(v).max()))

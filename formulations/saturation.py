@@ -1,0 +1,154 @@
+"""Saturation in the null space, one task at a time: the loop that `sns` and `sns-optimal` share."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dikbench.array import Array
+from dikbench.box import Box
+from dikbench.errors import Infeasible
+from dikbench.linear_algebra import inverse_and_row_space, solve_positive_definite
+from dikbench.problem import DikProblem
+from dikbench.tasks.task import LinearizedTask
+
+FREEDOM = 1e-6
+"""Square of the smallest share of a joint's velocity that must be free for it to be saturated:
+rounding grows by the inverse of the square, and what is above must stay below 1e-9."""
+
+ROUNDING = 1e-10
+"""A multiplier [rad/s] whose sign is not to be trusted."""
+
+NEGLIGIBLE = 1e-100
+"""A speed [rad/s] that is none: quotients by it stay finite."""
+
+
+class _Held(NamedTuple):
+    """The motion that saturated joints leave.
+
+    Attributes:
+        base: the least motion from the start that has them at their bounds, (nv,).
+        free: projector onto the motions that move none of them, (nv, nv).
+        effect: change of `base` per unit of each bound, (nv, number of saturated joints).
+    """
+
+    base: Array
+    free: Array
+    effect: Array
+
+
+def saturated_levels(
+    problem: DikProblem, box: Box, rank_tolerance: float, *, optimal: bool
+) -> Array:
+    """Every priority level in turn, each in the null space of those above, inside the box.
+
+    Raises:
+        Infeasible: if no scale of the first task was found for which the box holds.
+    """
+    v, N = np.zeros(problem.robot.nv), np.eye(problem.robot.nv)
+    levels = problem.levels
+    for number, level in enumerate(levels):
+        found = _saturated(level, v, N, box, rank_tolerance, optimal=optimal)
+        if found is not None:
+            v = found
+        elif number == 0:
+            raise Infeasible("saturation in the null space: no scale of the task fits the box")
+        if number + 1 < len(levels):
+            _, rows = inverse_and_row_space(level.J @ N, rank_tolerance)
+            N = N - rows.T @ rows
+    return v
+
+
+def _saturated(
+    level: LinearizedTask, start: Array, N: Array, box: Box, tolerance: float, *, optimal: bool
+) -> Array | None:
+    """The velocity of one level from `start` in the range of the projector N; None: none found."""
+    bounds: dict[int, float] = {}  # of the saturated joints
+    rank = None
+    best, best_scale = None, -1.0
+    for _ in range(2 * len(start) + 1):  # freeing joints may go round in circles
+        held = _hold(bounds, start, N)
+        if held is None:
+            break
+        inverse, rows = inverse_and_row_space(level.J @ held.free, tolerance)
+        rank = len(rows) if rank is None else rank
+        if len(rows) < rank:
+            break
+        a = inverse @ level.V
+        b = held.base - inverse @ (level.J @ held.base)
+        scale, critical = _scale(a, b, box, bounds)
+        if scale > best_scale:
+            best, best_scale = _inside(b + scale * a, box), scale
+        if optimal and scale >= 0:
+            wrong = _wrong_side(b + scale * a, held.effect, inverse @ level.J, box, bounds)
+            for joint in wrong:
+                del bounds[joint]
+            if wrong:
+                continue
+        if critical is None:
+            return _inside(a + b, box)
+        if held.free[critical, critical] <= FREEDOM:
+            break
+        outwards = a[critical] + b[critical] > box.upper[critical]
+        bounds[critical] = float((box.upper if outwards else box.lower)[critical])
+    return best
+
+
+def _inside(v: Array, box: Box) -> Array:
+    """The velocity without what sticks out of the box, which is rounding; faster than `np.clip`."""
+    held: Array = np.minimum(np.maximum(v, box.lower), box.upper)
+    return held
+
+
+def _hold(bounds: dict[int, float], start: Array, N: Array) -> _Held | None:
+    """Saturate joints, by least motion in the range of N; None where that leaves no way to."""
+    if not bounds:
+        return _Held(start, N, np.empty((len(start), 0)))
+    joints = list(bounds)
+    rows = N[joints]
+    solved = solve_positive_definite(rows[:, joints], rows)
+    if solved is None:
+        return None
+    effect = solved.T
+    gap = np.array([*bounds.values()]) - start[joints]
+    return _Held(start + effect @ gap, N - effect @ rows, effect)
+
+
+def _scale(a: Array, b: Array, box: Box, bounds: dict[int, float]) -> tuple[float, int | None]:
+    """The largest scale s <= 1 with a s + b in the box, and the joint to saturate next.
+
+    The scale is -1 where there is none that is not negative. The joint is, among those that are
+    outside at s = 1, the one that allows the least; None where none is.
+    """
+    v = a + b
+    outside = (v < box.lower) | (v > box.upper)
+    saturated = list(bounds)
+    outside[saturated] = False
+    if not outside.any():
+        return 1.0, None
+    moves = np.abs(a) > NEGLIGIBLE
+    inside = (box.lower <= b) & (b <= box.upper)
+    low, high = np.where(inside, -np.inf, np.inf), np.where(inside, np.inf, -np.inf)
+    np.divide(np.where(a > 0, box.lower, box.upper) - b, a, out=low, where=moves)
+    np.divide(np.where(a > 0, box.upper, box.lower) - b, a, out=high, where=moves)
+    low[saturated], high[saturated] = -np.inf, np.inf
+    most = min(1.0, float(high.min()))
+    scale = most if most >= max(0.0, float(low.max())) else -1.0
+    return scale, int(np.argmin(np.where(outside, high, np.inf)))
+
+
+def _wrong_side(
+    v: Array, effect: Array, done: Array, box: Box, bounds: dict[int, float]
+) -> list[int]:
+    """The saturated joints whose coming off the bound would make the motion smaller.
+
+    The multipliers of the bounds in min 1/2 ||v||^2: the derivative of ||v||^2/2 by each bound.
+    """
+    slope = (effect - done @ effect).T @ v
+    return [
+        joint
+        for joint, rate in zip(bounds, slope, strict=True)
+        if (bounds[joint] < box.upper[joint] and rate < -ROUNDING)
+        or (bounds[joint] > box.lower[joint] and rate > ROUNDING)
+    ]

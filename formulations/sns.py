@@ -1,0 +1,57 @@
+"""Saturation in the null space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from dikbench.array import Array
+from dikbench.box import Braking
+from dikbench.errors import DikbenchError
+from dikbench.problem import DikProblem, LimitKind, Solve
+from formulations.saturation import saturated_levels
+
+
+@dataclass(frozen=True)
+class SaturationInNullSpace:
+    """Saturation in the null space: hold joints at their bounds, let the others make up for it.
+
+        v = v_N + (J W)^+ (s V - J v_N),   lo <= v <= hi   (the velocity box),   0 <= s <= 1
+
+    For one task W = I and v_N = 0 to begin with. While a joint of v at s = 1 is outside the box:
+    the largest s that fits is noted; the joint that allows the least is held at the bound that it
+    breaks (W_jj = 0, v_N,j = that bound); where J W loses rank the best s so far is taken. Below
+    it each priority level k does the same in what the levels above leave free: N_(k-1), the
+    projector onto their null space, takes the place of I and v_(k-1) that of 0, and joints that
+    were held are free to come off their bounds. A level for which no s fits is left out.
+
+    J (m, nv) and V (m,) are each level's, poses in the task frame; v in rad/s. Strict priority
+    with bounds active or not; never off course and inside every limit; stops short of the largest
+    s in some states (one in twenty on a Panda asked for too much). At a singularity it does what
+    the pseudo-inverse does. Where the box excludes rest (outside a limit, or braking) there may be
+    no s for the first task: `Infeasible`. Weights play no part.
+
+    Attributes:
+        braking: how the box approaches a position limit (see `dikbench.box`).
+        rank_tolerance: singular values of J W up to this count as zero (absolute, units of J).
+
+    Source: [Flacco2012]; [Flacco2015]. Only joints outside the box are saturated, which the papers
+    do not say and boxes that exclude rest need.
+    """
+
+    braking: Braking = "viable"
+    rank_tolerance: float = 1e-6
+
+    keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        if not 0 <= self.rank_tolerance < np.inf:
+            raise DikbenchError("sns: rank_tolerance must be finite and at least 0")
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        box = problem.box(self.braking)
+        return saturated_levels(problem, box, self.rank_tolerance, optimal=False)

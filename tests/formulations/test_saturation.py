@@ -1,0 +1,398 @@
+"""Saturation in the null space: against the linear program, in closed form, and at the edges."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from dikbench import LinearizedTask, Robot, load_robot
+from dikbench.array import Array
+from dikbench.control_step import control_step
+from dikbench.errors import Infeasible
+from dikbench.kinematics import Kinematics, smallest_singular_value
+from dikbench.planar_arm import planar_arm
+from dikbench.problem import DikProblem, program_of
+from dikbench.quadratic_program import QuadraticProgram
+from dikbench.registry import make_formulation
+from dikbench.robot import model_limits
+from dikbench.solvers.catalogue import parse_solver
+from dikbench.solvers.checked import make_solve
+from dikbench.status import Status
+
+SNS = ("sns", "sns-optimal")
+LP = "lp-alpha[regularization=0]"
+COUNTS = [200, pytest.param(5000, marks=pytest.mark.long)]
+SAME = 1e-6
+"""Scales that differ by less are the same: the tolerance of the linear program."""
+
+
+@functools.cache
+def arm(n: int) -> Robot:
+    """An arm of n joints without limits."""
+    model = planar_arm((0.2,) * n, velocity_limit=1.0)
+    robot = Robot(f"planar{n}r", model, "tip", model_limits(model), np.zeros(n), (0, 1))
+    return robot.with_limits(position=None, velocity=None)
+
+
+def problem_of(lower: Array, upper: Array, *levels: tuple[Array, Array]) -> DikProblem:
+    """A control step with velocity limits and tasks J v = V in numbers, one per priority."""
+    robot = arm(len(lower)).with_limits(velocity=(lower, upper))
+    tasks = [
+        LinearizedTask(J, V, np.zeros(len(V)), 1.0, priority)
+        for priority, (J, V) in enumerate(levels, start=1)
+    ]
+    return DikProblem(robot, robot.q0, None, 0.01, tasks, robot.limits.at(robot.q0))
+
+
+def ask(law: str, problem: DikProblem) -> Array | None:
+    """What a law answers, by daqp where it needs a solver; None where it has no answer."""
+    formulation = make_formulation(law)
+    program = program_of(formulation)
+    solve = make_solve(None if program is None else parse_solver("daqp"), program)
+    outcome = control_step(formulation, problem, solve)
+    return outcome.velocity if outcome.status is Status.OK else None
+
+
+def answer(law: str, problem: DikProblem) -> Array:
+    """Likewise where there is an answer."""
+    v = ask(law, problem)
+    assert v is not None
+    return v
+
+
+def scale(law: str, problem: DikProblem) -> float:
+    """The scale s of the first task that a law reaches; it never leaves the course."""
+    task = problem.tasks[0]
+    achieved = task.J @ answer(law, problem)
+    s = float(achieved @ task.V / (task.V @ task.V))
+    assert np.abs(achieved - s * task.V).max() < 1e-6 * (1 + np.abs(task.V).max())
+    return s
+
+
+def scales(problems: list[DikProblem], *laws: str) -> list[Array]:
+    """The scales that laws reach, law by law."""
+    return [np.array([scale(law, problem) for problem in problems]) for law in laws]
+
+
+def arm_states(name: str, count: int, wish: Callable[[Array, Array], Array]) -> list[DikProblem]:
+    """Random states of an arm with its velocity limits alone, asked for `wish(v, twist)`.
+
+    v is the twist that a random joint velocity inside the limits gives, `twist` a normal one.
+    """
+    known = load_robot(name)
+    position, limit = known.limits.position, known.limits.velocity
+    assert position is not None
+    assert limit is not None
+    robot = known.with_limits(position=None)
+    random, kinematics, found = np.random.default_rng(0), Kinematics(robot), []
+    lower, upper = np.maximum(position.lower, -np.pi), np.minimum(position.upper, np.pi)
+    while len(found) < count:
+        q = random.uniform(lower, upper)
+        kinematics.update(q)
+        J = kinematics.jacobian(robot.frame_id).copy()
+        V = wish(J @ random.uniform(limit.lower, limit.upper), random.normal(size=6))
+        if smallest_singular_value(J) > 0.02:
+            task = LinearizedTask(J, V, np.zeros(6))
+            found.append(DikProblem(robot, q, None, 0.01, [task], robot.limits.at(q)))
+    return found
+
+
+def test_without_redundancy_three_laws_are_one() -> None:
+    """UR5, symmetric limits: saturation = the linear program = the scaled pseudo-inverse in s."""
+    problems = arm_states("ur5", 300, lambda _, twist: 2 * twist)
+    scaled, lp, *others = scales(problems, "pinv[after=scale]", LP, *SNS)
+    for reached in others:
+        np.testing.assert_allclose(reached, scaled, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(reached, lp, rtol=0, atol=1e-7)
+    assert 100 < np.count_nonzero(scaled < 0.99) < 300
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_with_redundancy_they_part(count: int) -> None:
+    """Panda, three times the twist of a joint velocity drawn inside the limits.
+
+    Means of s: scaled pseudo-inverse 0.403, saturation 0.438, linear program 0.439 (over 5000
+    states 0.408, 0.440, 0.441; saturation is at the program's in 96 % of them).
+    """
+    problems = arm_states("panda", count, lambda v, _: 3 * v)
+    scaled, basic, optimal, lp = scales(problems, "pinv[after=scale]", *SNS, LP)
+    print(
+        f"\nmeans of s at 3x: {scaled.mean():.4f} {basic.mean():.4f} {optimal.mean():.4f} "
+        f"{lp.mean():.4f}; sns reaches the LP in {np.mean(basic > lp - SAME):.2%}"
+    )
+    assert scaled.mean() == pytest.approx(0.403, rel=0.05)
+    assert basic.mean() == pytest.approx(0.438, rel=0.05)
+    assert lp.mean() == pytest.approx(0.439, rel=0.05)
+    for reached in (basic, optimal):
+        assert np.all(reached >= scaled - 1e-9)
+        assert np.all(reached <= lp + SAME)
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_reachable_twists_are_almost_always_reached(count: int) -> None:
+    """Panda, the twist of a joint velocity drawn inside the limits, so that s = 1 exists.
+
+    Share that does it: pseudo-inverse 86.7 %, saturation 99.90 %, linear program 100 %.
+    """
+    problems = arm_states("panda", count, lambda v, _: v)
+    done = {
+        law: float(np.mean(scales(problems, law)[0] > 1 - SAME))
+        for law in ("pinv[after=scale]", *SNS, LP)
+    }
+    print("\nshare with s = 1:", {law: f"{share:.2%}" for law, share in done.items()})
+    assert done["pinv[after=scale]"] == pytest.approx(0.867, abs=0.05)
+    assert done["sns"] > 0.99
+    assert done["sns-optimal"] > 0.99
+    assert done[LP] == 1
+
+
+def rethink_states(
+    count: int, m: int, n: int, *, symmetric: bool, seed: int = 0
+) -> Iterator[tuple[DikProblem, float]]:
+    """Rethink Robotics' protocol: random (J, box), J v*/s with v* in the box, and that s."""
+    random = np.random.default_rng(seed)
+    for _ in range(count):
+        J = random.uniform(-1, 1, (m, n))
+        upper = random.uniform(0.2, 2, n)
+        lower = -upper if symmetric else -random.uniform(0.2, 2, n)
+        v = random.uniform(lower, upper)
+        bound = np.where(random.random(n) < 0.5, lower, upper)
+        v = np.where(random.random(n) < 0.5, bound, v)  # half the joints are at a bound
+        s = float(random.uniform(0.1, 1))
+        yield problem_of(lower, upper, (J, J @ v / s)), s
+
+
+@pytest.mark.parametrize("count", COUNTS)
+@pytest.mark.parametrize("symmetric", [True, False], ids=["symmetric", "asymmetric"])
+@pytest.mark.parametrize(("m", "n"), [(6, 7), (3, 7)])
+def test_share_that_reaches_the_true_scale(m: int, n: int, symmetric: bool, count: int) -> None:
+    """Random J (m, n) and box, J v = V/s for a v in the box: who reaches s, and the linear program?
+
+    5000 states each: share that reaches s, share that reaches the program's, mean and worst
+    distance from it. The program (daqp) reaches s in all of them; symmetric box | asymmetric:
+
+    | law, (m, n) | symmetric | asymmetric |
+    |---|---|---|
+    | pinv[after=scale], (6, 7) | 10.3 %, 1.4 %, .123, .71 | 12.1 %, 1.4 %, .117, .77 |
+    | sns, sns-optimal, (6, 7) | 87.9 %, 85.0 %, .0068, .49 | 91.2 %, 88.3 %, .0048, .49 |
+    | pinv[after=scale], (3, 7) | 31.1 %, 9.3 %, .262, .84 | 33.8 %, 10.5 %, .251, .83 |
+    | sns, (3, 7) | 98.9 %, 89.4 %, .0015, .15 | 99.4 %, 91.1 %, .0009, .12 |
+    | sns-optimal, (3, 7) | 99.5 %, 92.8 %, .0006, .07 | 99.6 %, 93.9 %, .0004, .06 |
+    """
+    pairs = list(rethink_states(count, m, n, symmetric=symmetric))
+    problems, given = [problem for problem, _ in pairs], np.array([s for _, s in pairs])
+    scaled, *reached, lp = scales(problems, "pinv[after=scale]", *SNS, LP)
+    for law, s in zip(("pinv[after=scale]", *SNS), (scaled, *reached), strict=True):
+        print(
+            f"\n{law} ({m}, {n}), symmetric {symmetric}: reaches s {np.mean(s > given - SAME):.1%}"
+            f", the LP {np.mean(s > lp - SAME):.1%}, mean gap {np.mean(lp - s):.5f}, "
+            f"worst {np.max(lp - s):.3f}",
+            end="",
+        )
+    assert np.all(lp > given - SAME)
+    for s in reached:
+        assert np.all(s <= lp + SAME)
+        assert np.all(s >= scaled - 1e-9)
+        assert np.mean(s > given - SAME) > (0.8 if n - m == 1 else 0.97)
+        assert np.mean(lp - s) < (0.02 if n - m == 1 else 0.003)
+    basic, optimal = reached
+    assert np.mean(lp - optimal) <= np.mean(lp - basic) + 1e-9
+
+
+@pytest.mark.parametrize("law", SNS)
+def test_saturation_by_hand(law: str) -> None:
+    """J = (1, 1), v <= (1, 3): the second joint makes up for the first, and s = 1/2 at twice 4."""
+    lower, upper, J = -np.ones(2), np.array([1.0, 3.0]), np.ones((1, 2))
+    for wanted, v in (
+        (1.0, [0.5, 0.5]),
+        (3.0, [1, 2]),
+        (4.0, [1, 3]),
+        (8.0, [1, 3]),
+        (-4, [-1, -1]),
+    ):
+        problem = problem_of(lower, upper, (J, np.array([float(wanted)])))
+        np.testing.assert_allclose(answer(law, problem), v, atol=1e-12)
+
+
+def test_optimal_saturation_is_the_least_motion_where_the_task_is_done() -> None:
+    """Where s = 1 fits: min ||v||^2 s.t. J v = V in the box, by its condition of optimality.
+
+    That is v = clip(J^T y, lo, hi) for some y. The basic law misses it in 1 % of the states.
+    """
+    random = np.random.default_rng(0)
+    excess: dict[str, list[float]] = {law: [] for law in SNS}
+    for _ in range(400):
+        J, upper = random.normal(size=(3, 7)), random.uniform(0.2, 2, 7)
+        v = np.where(random.random(7) < 0.7, upper, random.uniform(-upper, upper))
+        problem = problem_of(-upper, upper, (J, 0.98 * J @ v))
+        if scale("pinv[after=scale]", problem) > 1 - 1e-9:
+            continue
+        for law in SNS:
+            if scale(law, problem) > 1 - 1e-9:
+                v = answer(law, problem)
+                free = np.abs(v) < upper - 1e-9
+                y = np.linalg.lstsq(J[:, free].T, v[free])[0]
+                excess[law].append(float(np.abs(v - np.clip(J.T @ y, -upper, upper)).max()))
+    assert len(excess["sns-optimal"]) > 200
+    assert max(excess["sns-optimal"]) < 1e-8
+    assert 0 < np.count_nonzero(np.array(excess["sns"]) > 1e-3) < 0.05 * len(excess["sns"])
+
+
+def second_scale(problem: DikProblem, first: Array) -> float | None:
+    """The largest s_2 for which J_1 v = first and J_2 v = s_2 V_2 fit the box, if any."""
+    (one, two), box = problem.levels, problem.box()
+    m, n = two.J.shape
+    A = np.block([[one.J, np.zeros((len(first), 1))], [two.J, -two.V[:, None]]])
+    program = QuadraticProgram(
+        np.zeros((n + 1, n + 1)),
+        -np.eye(n + 1)[n],
+        A=A,
+        b=np.concatenate([first, np.zeros(m)]),
+        lb=np.append(box.lower, 0.0),
+        ub=np.append(box.upper, 1.0),
+    )
+    try:
+        return float(make_solve(parse_solver("highs"), "lp")(program)[n])
+    except Infeasible:
+        return None
+
+
+@pytest.mark.parametrize("law", SNS)
+def test_lower_levels_are_scaled_too(law: str) -> None:
+    """With bounds active the second level keeps its direction, J_2 v = s_2 V_2, or is left out.
+
+    s_2 is at most, and mostly, what a linear program gives that holds the first level where it is.
+    """
+    random = np.random.default_rng(2)
+    gaps, scaled, missed = [], 0, 0
+    for _ in range(200):
+        upper = random.uniform(0.2, 2, 7)
+        first, second = [(random.normal(size=(2, 7)), 2 * random.normal(size=2)) for _ in range(2)]
+        problem = problem_of(-upper, upper, first, second)
+        v, alone = answer(law, problem), answer(law, problem_of(-upper, upper, first))
+        assert np.all(np.abs(v) <= upper)
+        np.testing.assert_allclose(first[0] @ (v - alone), np.zeros(2), atol=1e-9)
+        J, V = second
+        s, largest = float(J @ v @ V / (V @ V)), second_scale(problem, first[0] @ alone)
+        if np.abs(J @ v - s * V).max() > 1e-9:  # left out
+            np.testing.assert_array_equal(v, alone)
+            missed += largest is not None
+            continue
+        assert largest is not None
+        gaps.append(largest - s)
+        scaled += 0 <= s < 1 - SAME
+    print(
+        f"\n{law}: second level left out {200 - len(gaps)} times, {missed} of them in vain; else "
+        f"at its LP in {np.mean(np.array(gaps) < SAME):.0%}, mean gap {np.mean(gaps):.4f}"
+    )
+    assert min(gaps) > -SAME
+    assert np.mean(np.array(gaps) < SAME) > 0.8
+    assert np.mean(gaps) < 0.02
+    assert missed < 10
+    assert scaled > 20
+
+
+@pytest.mark.parametrize("law", SNS)
+def test_level_that_does_not_fit_is_left_out(law: str) -> None:
+    """A second task for which no scale fits moves nothing, and the third still has its turn."""
+    upper = np.array([1.0, 1.0, 1.0])
+    first = (np.array([[1.0, 0.0, 0.0]]), np.array([1.0]))
+    # It needs joint 2 to make up for joint 1 even at s = 0, beyond its limit.
+    second = (np.array([[2.0, 1.0, 0.0]]), np.array([1e-3]))
+    third = (np.array([[0.0, 0.0, 1.0]]), np.array([0.5]))
+    v = answer(law, problem_of(-upper, upper, first, second, third))
+    np.testing.assert_allclose(v, [1.0, 0.0, 0.5], atol=1e-12)
+
+
+@pytest.mark.parametrize("law", SNS)
+@pytest.mark.parametrize("name", ["panda", "ur5"])
+def test_at_a_singularity_it_is_the_scaled_pseudo_inverse(law: str, name: str) -> None:
+    """Where J has lost a rank for good, what can be done is done and scaled, without a blow-up."""
+    robot = load_robot(name).with_limits(position=None)
+    q = np.zeros(robot.nv)  # fully stretched: singular on both
+    kinematics = Kinematics(robot)
+    kinematics.update(q)
+    J = kinematics.jacobian(robot.frame_id).copy()
+    assert smallest_singular_value(J) < 1e-9
+    for twist in np.random.default_rng(3).normal(size=(20, 6)):
+        task = LinearizedTask(J, 3 * twist, np.zeros(6))
+        problem = DikProblem(robot, q, None, 0.01, [task], robot.limits.at(q))
+        plain, v = answer("pinv[after=scale]", problem), answer(law, problem)
+        done = J @ plain
+        share = float(done @ (J @ v) / (done @ done))
+        np.testing.assert_allclose(J @ v, share * done, atol=1e-9)
+        assert share >= 1 - 1e-9
+        if name == "ur5":
+            assert robot.limits.velocity is not None
+            assert np.all(np.abs(v) <= robot.limits.velocity.upper)
+
+
+def outside(name: str, joint: int) -> DikProblem:
+    """An arm at rest, one joint 0.05 rad above its limit, asked to keep its frame still."""
+    robot = load_robot(name)
+    assert robot.limits.position is not None
+    q = robot.q0.copy()
+    q[joint] = robot.limits.position.upper[joint] + 0.05
+    kinematics = Kinematics(robot)
+    kinematics.update(q)
+    task = LinearizedTask(kinematics.jacobian(robot.frame_id).copy(), np.zeros(6), np.zeros(6))
+    return DikProblem(robot, q, None, 0.01, [task], robot.limits.at(q))
+
+
+@pytest.mark.parametrize("law", SNS)
+def test_way_back_from_outside_a_limit_is_a_self_motion(law: str) -> None:
+    """Outside a limit the joint goes back at the speed asked for, and the frame stays at rest."""
+    problem = outside("panda", 0)
+    v = answer(law, problem)
+    box = problem.box()
+    assert v[0] == box.upper[0] < 0
+    np.testing.assert_allclose(problem.tasks[0].J @ v, np.zeros(6), atol=1e-12)
+
+
+@pytest.mark.parametrize("law", [*SNS, LP])
+def test_no_way_back_without_redundancy(law: str) -> None:
+    """Six joints have no self-motion: no scale fits, for the linear program either."""
+    assert ask(law, outside("ur5", 0)) is None
+
+
+@pytest.mark.parametrize("law", SNS)
+def test_answers_wherever_the_box_allows_rest_and_mostly_elsewhere(law: str) -> None:
+    """Boxes that exclude rest: no answer that the linear program has not, and nearly all it has."""
+    random = np.random.default_rng(4)
+    feasible = answered = 0
+    for _ in range(300):
+        middle, half = random.uniform(-0.6, 0.6, 7), random.uniform(0.1, 2, 7)
+        J = random.normal(size=(3, 7))
+        problem = problem_of_box(middle - half, middle + half, J, 3 * random.normal(size=3))
+        v, x = ask(law, problem), ask(LP, problem)
+        if x is None:
+            assert v is None
+            continue
+        feasible += 1
+        answered += v is not None
+    print(f"\n{law}: answers {answered} of {feasible} feasible programs whose box excludes rest")
+    assert feasible > 100
+    assert answered > 0.8 * feasible
+
+
+def problem_of_box(lower: Array, upper: Array, J: Array, V: Array) -> DikProblem:
+    """A control step whose box is given: acceleration limits about a motion before."""
+    dt = 0.01
+    robot = arm(len(lower)).with_limits(acceleration=(upper - lower) / (2 * dt))
+    task = LinearizedTask(J, V, np.zeros(len(V)))
+    return DikProblem(robot, robot.q0, (lower + upper) / 2, dt, [task], robot.limits.at(robot.q0))
+
+
+def test_joint_with_hardly_any_freedom_left_is_not_saturated() -> None:
+    """Below a task that leaves a joint 1e-4 of its motion, saturating it would amplify rounding."""
+    direction = np.array([1e-4, 1.0, 1.0])
+    first = np.linalg.svd(direction[None])[2][1:]  # all that is left free is the direction
+    upper = np.array([1.0, 9.0, 9.0])
+    levels = ((first, np.array([1.0, 1.0])), (np.ones((1, 3)), np.array([40.0])))
+    for law in SNS:
+        alone = answer(law, problem_of(-upper, upper, levels[0]))
+        both = answer(law, problem_of(-upper, upper, *levels))
+        assert np.abs(first @ (both - alone)).max() < 1e-12
