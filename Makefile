@@ -31,7 +31,11 @@ benchmark:       ## how fast the harness is, against its peers (let nothing else
 benchmark-scenarios:  ## how long each scenario takes to build
 	$(PYTHON) tests/benchmarks/scenario_building.py
 
+# Narrower: make mutation MUTANTS="formulations.sns*"; then `python -m mutmut results`, `... browse`.
+mutation:        ## which changes to the laws and limits no test notices (hours; see pyproject.toml)
+	$(PYTHON) -m pip install --quiet mutmut && $(PYTHON) -m mutmut run $(MUTANTS)
+
 constraints:     ## the installed versions become the tested ones
 	.venv/bin/pip freeze --exclude-editable --exclude pip --exclude setuptools > constraints.txt
 
-.PHONY: help setup test test-long lint format contract quick benchmark benchmark-scenarios constraints
+.PHONY: help setup test test-long lint format contract quick benchmark benchmark-scenarios mutation constraints

@@ -87,3 +87,16 @@ class DampedInverse:
             )
         matrix: Array = (self._Vt.T * share).dot(self._Vt)
         return matrix
+
+
+def inverse_and_row_space(A: Array, tolerance: float, damping: float = 0.0) -> tuple[Array, Array]:
+    """The (damped) inverse (n, m) of A (m, n), and an orthonormal basis (r, n) of A's row space.
+
+    Singular values s up to the (absolute) tolerance count as zero, r are above it; their inverse is
+    s / (s^2 + damping^2). I - basis^T basis projects onto the null space of A, damped or not.
+    """
+    U, singular, Vt, _ = dgesdd(A, full_matrices=0)
+    rank = int((singular > tolerance).sum())
+    kept, basis = singular[:rank], Vt[:rank]
+    inverse: Array = (basis.T * (kept / (kept * kept + damping * damping))) @ U[:, :rank].T
+    return inverse, basis

@@ -26,6 +26,8 @@ from formulations.nullspace_unprojected import NullspaceUnprojected
 from formulations.pink_qp import PinkQp
 from formulations.pseudo_inverse import PseudoInverse
 from formulations.qp_velocity import QpVelocity
+from formulations.sns import SaturationInNullSpace
+from formulations.sns_optimal import OptimalSaturationInNullSpace
 from formulations.weighted_least_norm import WeightedLeastNorm
 from formulations.weighted_qp import WeightedQp
 
@@ -38,6 +40,8 @@ FORMULATIONS: Mapping[str, type[Formulation]] = MappingProxyType(
         "nullspace": Nullspace,
         "nullspace-robust": NullspaceRobust,
         "nullspace-unprojected": NullspaceUnprojected,
+        "sns": SaturationInNullSpace,
+        "sns-optimal": OptimalSaturationInNullSpace,
         "qp": WeightedQp,
         "qp-velocity": QpVelocity,
         "hqp": HierarchicalQp,

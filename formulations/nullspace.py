@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -42,8 +41,6 @@ class Nullspace:
     damping: float = 0.0
     projector: Projector = "exact"
     rank_tolerance: float = 1e-6
-    damping: float = 0.0
-    projector: Literal["exact", "damped"] = "exact"
 
     def __post_init__(self) -> None:
         """Check the parameters."""

@@ -37,7 +37,9 @@ class NullspaceUnprojected:
     def __post_init__(self) -> None:
         """Check the parameters."""
         if not 0 <= self.rank_tolerance < np.inf:
-            raise DikbenchError("nullspace-unprojected: rank_tolerance must be finite, at least 0")
+            raise DikbenchError(
+                "nullspace-unprojected: rank_tolerance must be finite and at least 0"
+            )
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

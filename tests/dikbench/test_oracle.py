@@ -9,9 +9,9 @@ import pandas as pd
 import pinocchio as pin
 import pytest
 
+from dikbench.curves import circle
 from dikbench.kinematics import Kinematics
 from dikbench.oracle import ORACLE, follow, joint_oracle, oracle_motion, solve_placement
-from dikbench.curves import circle
 from dikbench.registry import make_scenario
 from dikbench.robot_catalogue import load_robot
 from dikbench.run.results import ResultsFolder

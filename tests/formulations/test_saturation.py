@@ -32,7 +32,7 @@ SAME = 1e-6
 @functools.cache
 def arm(n: int) -> Robot:
     """An arm of n joints without limits."""
-    model = planar_arm((0.2,) * n, velocity_limit=1.0)
+    model = planar_arm((0.2,) * n, velocity_limits=(1.0,) * n)
     robot = Robot(f"planar{n}r", model, "tip", model_limits(model), np.zeros(n), (0, 1))
     return robot.with_limits(position=None, velocity=None)
 
@@ -199,7 +199,7 @@ def test_share_that_reaches_the_true_scale(m: int, n: int, symmetric: bool, coun
         assert np.mean(s > given - SAME) > (0.8 if n - m == 1 else 0.97)
         assert np.mean(lp - s) < (0.02 if n - m == 1 else 0.003)
     basic, optimal = reached
-    assert np.mean(lp - optimal) <= np.mean(lp - basic) + 1e-9
+    assert np.mean(lp - optimal) <= (1 if n - m == 1 else 0.7) * np.mean(lp - basic)
 
 
 @pytest.mark.parametrize("law", SNS)
@@ -214,6 +214,19 @@ def test_saturation_by_hand(law: str) -> None:
         (-4, [-1, -1]),
     ):
         problem = problem_of(lower, upper, (J, np.array([float(wanted)])))
+        np.testing.assert_allclose(answer(law, problem), v, atol=1e-12)
+
+
+@pytest.mark.parametrize("law", SNS)
+def test_joint_that_the_task_does_not_move(law: str) -> None:
+    """A joint beside the task sets no scale; where its box excludes rest it is held in it."""
+    J = np.array([[1.0, 1.0, 0.0]])
+    for wanted, v in ((3.0, [1, 2, 0]), (8.0, [1, 3, 0])):
+        problem = problem_of(-np.ones(3), np.array([1.0, 3.0, 1.0]), (J, np.array([wanted])))
+        np.testing.assert_allclose(answer(law, problem), v, atol=1e-12)
+    lower, upper = np.array([-1.0, -1.0, 0.2]), np.array([1.0, 3.0, 0.8])
+    for wanted, v in ((0.0, [0, 0, 0.2]), (3.0, [1, 2, 0.2]), (8.0, [1, 3, 0.2])):
+        problem = problem_of_box(lower, upper, J, np.array([wanted]))
         np.testing.assert_allclose(answer(law, problem), v, atol=1e-12)
 
 
@@ -386,13 +399,20 @@ def problem_of_box(lower: Array, upper: Array, J: Array, V: Array) -> DikProblem
     return DikProblem(robot, robot.q0, (lower + upper) / 2, dt, [task], robot.limits.at(robot.q0))
 
 
-def test_joint_with_hardly_any_freedom_left_is_not_saturated() -> None:
-    """Below a task that leaves a joint 1e-4 of its motion, saturating it would amplify rounding."""
-    direction = np.array([1e-4, 1.0, 1.0])
-    first = np.linalg.svd(direction[None])[2][1:]  # all that is left free is the direction
-    upper = np.array([1.0, 9.0, 9.0])
-    levels = ((first, np.array([1.0, 1.0])), (np.ones((1, 3)), np.array([40.0])))
-    for law in SNS:
-        alone = answer(law, problem_of(-upper, upper, levels[0]))
-        both = answer(law, problem_of(-upper, upper, *levels))
-        assert np.abs(first @ (both - alone)).max() < 1e-12
+@pytest.mark.parametrize("law", SNS)
+def test_joint_with_hardly_any_freedom_left_is_not_saturated(law: str) -> None:
+    """Below a task that leaves a joint 1e-6 of its motion, saturating it would amplify rounding.
+
+    The level below goes as far as that joint lets it come.
+    """
+    # It leaves free (1e-6, 1, 2, 0) and (0, 0, 0, 1).
+    first = (np.array([[0, 2, -1, 0], [1, -2e-7, -4e-7, 0]]), np.array([0, 0.1]))
+    second = (np.ones((1, 4)), np.array([90.0]))
+    upper = np.full(4, 99.0)
+    alone = answer(law, problem_of(-upper, upper, first))
+    assert alone[0] == pytest.approx(0.1)
+    upper[0] = alone[0] + 1e-5
+    both = answer(law, problem_of(-upper, upper, first, second))
+    np.testing.assert_allclose(first[0] @ (both - alone), np.zeros(2), atol=1e-12)
+    assert both[0] == pytest.approx(upper[0], abs=1e-9)
+    assert second[0] @ both > second[0] @ alone + 1
