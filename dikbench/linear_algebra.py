@@ -5,9 +5,15 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from scipy.linalg.lapack import dgesdd, dposv
+from scipy.linalg.lapack import dgesdd, dposv, dpotrf
 
 from dikbench.array import Array
+
+
+def thin_svd(A: Array) -> tuple[Array, Array, Array]:
+    """U (m, k), singular values (k,) falling, V^T (k, n) of A (m, n), k = min(m, n)."""
+    U, singular, Vt, _ = dgesdd(A, full_matrices=0)
+    return U, singular, Vt
 
 
 def pseudo_inverse(A: Array, tolerance: float) -> Array:
@@ -15,12 +21,38 @@ def pseudo_inverse(A: Array, tolerance: float) -> Array:
 
     The tolerance is absolute, in the units of A: a relative one blows up where A itself vanishes.
     """
-    U, singular, Vt, _ = dgesdd(A, full_matrices=0)
+    U, singular, Vt = thin_svd(A)
+    result: Array = (Vt.T * _inverted(singular, tolerance)) @ U.T
+    return result
+
+
+def least_norm(A: Array, b: Array, tolerance: float) -> Array:
+    """The shortest least-squares solution of A x = b, (n,): `pseudo_inverse` times b (m,)."""
+    U, singular, Vt = thin_svd(A)
+    x: Array = (_inverted(singular, tolerance) * b.dot(U)).dot(Vt)
+    return x
+
+
+def damped_least_squares(A: Array, b: Array, squared_damping: float) -> Array:
+    """The minimiser (n,) of ||A x - b||^2 + lambda^2 ||x||^2 for A (m, n), b (m,).
+
+    The smaller of the two Gram matrices is factorised: A A^T where the rows are fewer, else A^T A.
+    Without damping, where that matrix is singular, the shortest minimiser.
+    """
+    m, n = A.shape
+    damped = A.dot(A.T) if m <= n else A.T.dot(A)
+    damped.flat[:: len(damped) + 1] += squared_damping
+    y = solve_positive_definite(damped, b if m <= n else b.dot(A))
+    if y is None:  # (almost) no damping, at a singularity
+        return least_norm(A, b, np.finfo(float).eps)
+    return y.dot(A) if m <= n else y
+
+
+def _inverted(singular: Array, tolerance: float) -> Array:
     kept = singular > tolerance
     inverse = np.zeros_like(singular)
     inverse[kept] = 1.0 / singular[kept]
-    result: Array = (Vt.T * inverse) @ U.T
-    return result
+    return inverse
 
 
 @lru_cache(maxsize=64)
@@ -35,3 +67,9 @@ def solve_positive_definite(A: Array, b: Array) -> Array | None:
     """X with A x = b for a symmetric positive definite A (n, n); None where A is not."""
     _, x, info = dposv(A, b)
     return x if info == 0 else None
+
+
+def root_determinant(A: Array) -> float:
+    """The square root of det A for a symmetric A (n, n); 0 where A is not positive definite."""
+    factor, info = dpotrf(A)
+    return float(factor.diagonal().prod()) if info == 0 else 0.0

@@ -9,7 +9,8 @@ import numpy as np
 
 from dikbench.array import Array
 from dikbench.errors import DikbenchError
-from dikbench.linear_algebra import pseudo_inverse
+from dikbench.linear_algebra import least_norm
+from dikbench.limits import Interval
 from dikbench.problem import DikProblem, LimitKind, Solve
 
 
@@ -48,13 +49,16 @@ class PseudoInverse:
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
         task = problem.primary
-        v: Array = pseudo_inverse(task.J, self.rank_tolerance) @ task.V
+        v = least_norm(task.J, task.V, self.rank_tolerance)
         limit = problem.limits.joint.velocity
         if self.after == "none" or limit is None:
             return v
-        if self.after == "clip":
-            return np.clip(v, limit.lower, limit.upper)
-        # How often the nearer bound fits into each velocity; below 1 the smallest is the scale.
-        bound = np.where(v > 0, limit.upper, -limit.lower)
-        excess = float(np.max(np.abs(v) / np.maximum(bound, np.finfo(float).tiny)))
-        return v / max(1.0, excess)
+        return np.clip(v, limit.lower, limit.upper) if self.after == "clip" else scaled(v, limit)
+
+
+def scaled(v: Array, limit: Interval) -> Array:
+    """s v with the largest s <= 1 that lies inside the limits, (nv,)."""
+    # How often the nearer bound fits into each velocity; below 1 the smallest is the scale.
+    bound = np.where(v > 0, limit.upper, -limit.lower)
+    excess = float(np.max(np.abs(v) / np.maximum(bound, np.finfo(float).tiny)))
+    return v / max(1.0, excess)
