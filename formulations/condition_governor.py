@@ -30,8 +30,8 @@ class ConditionGovernor:
     leaving is not slowed down, so that it cannot lock. Weights play no part.
 
     The source judges whether the motion approaches by a probing step along u_m; here
-    dsigma_i/dt = u_i^T dJ/dt v_i is exact. Its later versions also slow leaving down, over twice the
-    range, and stop above kappa_stop whatever the direction.
+    dsigma_i/dt = u_i^T dJ/dt v_i is exact. Its later versions also slow leaving down, over twice
+    the range, and stop above kappa_stop whatever the direction.
 
     Attributes:
         slow: kappa_slow, where slowing down begins.

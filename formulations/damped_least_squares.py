@@ -25,8 +25,7 @@ class DampedLeastSquares:
     Attributes:
         damping: lambda, unsquared (units of J); 0.01-0.05 in the recent literature.
 
-    Source: Wampler (1986); Nakamura & Hanafusa (1986), Inverse kinematic solutions with
-    singularity robustness for robot manipulator control.
+    Source: [Wampler1986], [NakamuraHanafusa1986].
     """
 
     damping: float = 0.05

@@ -27,9 +27,9 @@ class JParse:
 
     Attributes:
         threshold: gamma, the share of the largest singular value up to which a direction counts as
-            nearly lost.
+            nearly lost (the source lets those have gains of their own, here 1).
 
-    Source: [Guptasarma2025], with gain 1 in the nearly lost directions.
+    Source: [Guptasarma2025].
     """
 
     threshold: float = 0.1

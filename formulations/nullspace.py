@@ -28,8 +28,7 @@ class Nullspace:
         rank_tolerance: singular values of J_k N_(k-1) up to this count as zero (absolute, units of
             J_k: a relative one explodes where nothing is left free).
 
-    Source: Nakamura, Hanafusa & Yoshikawa (1987), Task-priority based redundancy control; Siciliano
-    & Slotine (1991), A general framework for managing multiple tasks.
+    Source: [Nakamura1987] for two tasks, [SicilianoSlotine1991] for any number.
     """
 
     rank_tolerance: float = 1e-6

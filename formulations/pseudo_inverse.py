@@ -9,8 +9,8 @@ import numpy as np
 
 from dikbench.array import Array
 from dikbench.errors import DikbenchError
-from dikbench.linear_algebra import least_norm
 from dikbench.limits import Interval
+from dikbench.linear_algebra import least_norm
 from dikbench.problem import DikProblem, LimitKind, Solve
 
 
@@ -30,7 +30,7 @@ class PseudoInverse:
         after: what to do with a velocity outside the limits.
         rank_tolerance: singular values up to this count as zero (absolute, units of J).
 
-    Source: Whitney (1969), Resolved motion rate control of manipulators and human prostheses.
+    Source: [Whitney1969].
     """
 
     after: Literal["none", "clip", "scale"] = "none"
@@ -57,7 +57,7 @@ class PseudoInverse:
 
 
 def scaled(v: Array, limit: Interval) -> Array:
-    """s v with the largest s <= 1 that lies inside the limits, (nv,)."""
+    """The longest s v, s <= 1, inside the limits, (nv,)."""
     # How often the nearer bound fits into each velocity; below 1 the smallest is the scale.
     bound = np.where(v > 0, limit.upper, -limit.lower)
     excess = float(np.max(np.abs(v) / np.maximum(bound, np.finfo(float).tiny)))

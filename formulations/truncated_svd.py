@@ -24,9 +24,10 @@ class TruncatedSvd:
     weights play no part.
 
     Attributes:
-        relative_tolerance: c, the share of the largest singular value up to which one is dropped.
+        relative_tolerance: c, the share of the largest singular value up to which one is dropped;
+            0.01 in the source's published code.
 
-    Source: [Buss2004], whose published code drops below 0.01 sigma_1.
+    Source: [Buss2004].
     """
 
     relative_tolerance: float = 0.01
