@@ -1,7 +1,16 @@
 """What can be wanted of a robot: one task per file."""
 
+from dikbench.tasks.centre_of_mass import CentreOfMassTask
+from dikbench.tasks.damping import DampingTask
 from dikbench.tasks.pose import PoseTask
 from dikbench.tasks.posture import PostureTask
 from dikbench.tasks.task import LinearizedTask, Task
 
-__all__ = ["LinearizedTask", "PoseTask", "PostureTask", "Task"]
+__all__ = [
+    "CentreOfMassTask",
+    "DampingTask",
+    "LinearizedTask",
+    "PoseTask",
+    "PostureTask",
+    "Task",
+]
