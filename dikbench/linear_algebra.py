@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from scipy.linalg.lapack import dgesdd, dposv, dpotrf
+from scipy.linalg.lapack import dgeqrf, dgesdd, dposv
 
 from dikbench.array import Array
 
@@ -69,7 +69,13 @@ def solve_positive_definite(A: Array, b: Array) -> Array | None:
     return x if info == 0 else None
 
 
-def root_determinant(A: Array) -> float:
-    """The square root of det A for a symmetric A (n, n); 0 where A is not positive definite."""
-    factor, info = dpotrf(A)
-    return float(factor.diagonal().prod()) if info == 0 else 0.0
+def volume(A: Array) -> float:
+    """The square root of det(A A^T) for A (m, n), the product of its singular values if m <= n.
+
+    From the triangle R of A^T = Q R: a Gram matrix would lose half of the digits.
+    """
+    m, n = A.shape
+    if m > n:
+        return 0.0
+    R, _, _, _ = dgeqrf(A.T)
+    return float(abs(R.diagonal().prod()))

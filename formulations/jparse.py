@@ -46,5 +46,5 @@ class JParse:
         if sigma[0] == 0:
             return np.zeros(Vt.shape[1])
         safe = np.maximum(sigma, self.threshold * sigma[0])
-        v: Array = (sigma / safe**2 * task.V.dot(U)).dot(Vt)
+        v: Array = (sigma / safe / safe * task.V.dot(U)).dot(Vt)
         return v

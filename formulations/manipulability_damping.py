@@ -8,7 +8,7 @@ import numpy as np
 
 from dikbench.array import Array
 from dikbench.errors import DikbenchError
-from dikbench.linear_algebra import damped_least_squares, root_determinant
+from dikbench.linear_algebra import damped_least_squares, volume
 from dikbench.problem import DikProblem, Solve
 
 
@@ -45,6 +45,5 @@ class ManipulabilityDamping:
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
         task = problem.primary
-        manipulability = root_determinant(task.J.dot(task.J.T))
-        damping = self.damping * max(0.0, 1.0 - manipulability / self.threshold)
+        damping = self.damping * max(0.0, 1.0 - volume(task.J) / self.threshold)
         return damped_least_squares(task.J, task.V, damping**2)

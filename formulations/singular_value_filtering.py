@@ -22,7 +22,8 @@ class SingularValueFiltering:
     J = sum_i sigma_i u_i v_i^T (m, nv) and V (m,) are the primary task's, in the task frame; v in
     rad/s. h(0) = s_0 and h rises, hence ||v|| <= ||V|| / s_0, also where rank is lost. Smooth and
     nearly exact away from singularities; at one it does not slow down: the lost direction is asked
-    for at 1/s_0, in a joint direction whose sign turns over. Knows no limits; weights play no part.
+    for at 1/s_0, in a joint direction v_m that is then chance. Knows no limits; weights play no
+    part.
 
     Attributes:
         smallest: s_0, the value that a lost singular value is taken for (units of J); 0.005-0.01.
