@@ -18,9 +18,18 @@ if TYPE_CHECKING:
     from dikbench.robot_catalogue import load_robot
     from dikbench.scenario import Scenario
     from dikbench.status import Status
-    from dikbench.tasks import LinearizedTask, PoseTask, PostureTask, Task
+    from dikbench.tasks import (
+        CentreOfMassTask,
+        DampingTask,
+        LinearizedTask,
+        PoseTask,
+        PostureTask,
+        Task,
+    )
 
 _HOME = {
+    "CentreOfMassTask": "tasks",
+    "DampingTask": "tasks",
     "DikAnswer": "one_step",
     "DikProblem": "problem",
     "DikbenchError": "errors",
@@ -41,6 +50,8 @@ _HOME = {
 }
 
 __all__ = [
+    "CentreOfMassTask",
+    "DampingTask",
     "DikAnswer",
     "DikProblem",
     "DikbenchError",

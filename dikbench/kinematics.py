@@ -43,6 +43,15 @@ class Kinematics:
         J: Array = pin.getFrameJacobian(self._model, self._data, frame, LOCAL)
         return J if J.ndim == 2 else J[:, None]  # of a single joint Pinocchio makes a vector
 
+    def centre_of_mass(self) -> tuple[Array, Array]:
+        """Centre of mass (3,) [m] and its Jacobian (3, nv), in the axes of the world.
+
+        Not finite if the model has no mass.
+        """
+        J: Array = pin.jacobianCenterOfMass(self._model, self._data, self.q, False).copy()
+        centre: Array = self._data.com[0].copy()
+        return centre, J
+
 
 def smallest_singular_value(J: Array) -> float:
     """The smallest of the min(m, n) singular values of a task Jacobian (m, n)."""

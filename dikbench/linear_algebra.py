@@ -6,11 +6,17 @@ from functools import lru_cache
 from typing import Literal
 
 import numpy as np
-from scipy.linalg.lapack import dgesdd, dposv
+from scipy.linalg.lapack import dgeqrf, dgesdd, dposv
 
 from dikbench.array import Array
 
 Projector = Literal["exact", "damped"]
+
+
+def thin_svd(A: Array) -> tuple[Array, Array, Array]:
+    """U (m, k), singular values (k,) falling, V^T (k, n) of A (m, n), k = min(m, n)."""
+    U, singular, Vt, _ = dgesdd(A, full_matrices=0)
+    return U, singular, Vt
 
 
 def pseudo_inverse(A: Array, tolerance: float) -> Array:
@@ -18,12 +24,38 @@ def pseudo_inverse(A: Array, tolerance: float) -> Array:
 
     The tolerance is absolute, in the units of A: a relative one blows up where A itself vanishes.
     """
-    U, singular, Vt, _ = dgesdd(A, full_matrices=0)
+    U, singular, Vt = thin_svd(A)
+    result: Array = (Vt.T * _inverted(singular, tolerance)) @ U.T
+    return result
+
+
+def least_norm(A: Array, b: Array, tolerance: float) -> Array:
+    """The shortest least-squares solution of A x = b, (n,): `pseudo_inverse` times b (m,)."""
+    U, singular, Vt = thin_svd(A)
+    x: Array = (_inverted(singular, tolerance) * b.dot(U)).dot(Vt)
+    return x
+
+
+def damped_least_squares(A: Array, b: Array, squared_damping: float) -> Array:
+    """The minimiser (n,) of ||A x - b||^2 + lambda^2 ||x||^2 for A (m, n), b (m,).
+
+    The smaller of the two Gram matrices is factorised: A A^T where the rows are fewer, else A^T A.
+    Without damping, where that matrix is singular, the shortest minimiser.
+    """
+    m, n = A.shape
+    damped = A.dot(A.T) if m <= n else A.T.dot(A)
+    damped.flat[:: len(damped) + 1] += squared_damping
+    y = solve_positive_definite(damped, b if m <= n else b.dot(A))
+    if y is None:  # (almost) no damping, at a singularity
+        return least_norm(A, b, np.finfo(float).eps)
+    return y.dot(A) if m <= n else y
+
+
+def _inverted(singular: Array, tolerance: float) -> Array:
     kept = singular > tolerance
     inverse = np.zeros_like(singular)
     inverse[kept] = 1.0 / singular[kept]
-    result: Array = (Vt.T * inverse) @ U.T
-    return result
+    return inverse
 
 
 @lru_cache(maxsize=64)
@@ -100,3 +132,15 @@ def inverse_and_row_space(A: Array, tolerance: float, damping: float = 0.0) -> t
     kept, basis = singular[:rank], Vt[:rank]
     inverse: Array = (basis.T * (kept / (kept * kept + damping * damping))) @ U[:, :rank].T
     return inverse, basis
+
+
+def volume(A: Array) -> float:
+    """The square root of det(A A^T) for A (m, n), the product of its singular values if m <= n.
+
+    From the triangle R of A^T = Q R: a Gram matrix would lose half of the digits.
+    """
+    m, n = A.shape
+    if m > n:
+        return 0.0
+    R, _, _, _ = dgeqrf(A.T)
+    return float(abs(R.diagonal().prod()))

@@ -27,9 +27,14 @@ def listing(subject: str) -> list[str]:
 def _aligned(rows: list[tuple[str, str, str]]) -> list[str]:
     width = max(len(name) for name, _, _ in rows)
     return [
-        f"{name:<{width}}  {summary}" + (f" [{source}]" if source else "")
+        f"{name:<{width}}  {summary} {_bracketed(source)}".rstrip()
         for name, summary, source in rows
     ]
+
+
+def _bracketed(source: str) -> str:
+    """A source in brackets; the keys of the references page bring their own."""
+    return f"[{source}]" if source and "[" not in source else source
 
 
 def _formulations() -> list[tuple[str, str, str]]:

@@ -13,7 +13,7 @@ from dikbench.errors import DikbenchError
 from dikbench.linear_algebra import null_space
 from dikbench.problem import DikProblem, LimitKind, Solve
 from dikbench.quadratic_program import Program, QuadraticProgram
-from dikbench.tasks.posture import LinearizedPosture
+from dikbench.tasks.task import LinearizedJointTask
 from formulations.lp_alpha import alpha_program
 
 
@@ -35,8 +35,7 @@ class AlphaTwoStage:
         rank_tolerance: singular values up to this count as zero (absolute, units of J).
         braking: how the box approaches a position limit (see `dikbench.box`).
 
-    Source: our own; stage 1 is Tedrake's (Robotic Manipulation, ch. 3), stage 2 the lexicographic
-    order of Kanoun, Lamiraux & Wieber (2011).
+    Source: our own; stage 1 is that of [Tedrake], stage 2 the lexicographic order of [Kanoun2011].
     """
 
     rank_tolerance: float = 1e-6
@@ -73,6 +72,6 @@ class AlphaTwoStage:
 def posture_velocity(problem: DikProblem) -> Array:
     """The wanted velocity of the problem's first posture task, (nv,) [rad/s]; else zero."""
     for task in problem.tasks:
-        if isinstance(task, LinearizedPosture):
+        if isinstance(task, LinearizedJointTask) and task.error.any():  # not one of damping
             return task.V
     return np.zeros(problem.robot.nv)

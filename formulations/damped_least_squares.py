@@ -8,7 +8,7 @@ import numpy as np
 
 from dikbench.array import Array
 from dikbench.errors import DikbenchError
-from dikbench.linear_algebra import pseudo_inverse, solve_positive_definite
+from dikbench.linear_algebra import damped_least_squares
 from dikbench.problem import DikProblem, Solve
 
 
@@ -25,8 +25,7 @@ class DampedLeastSquares:
     Attributes:
         damping: lambda, unsquared (units of J); 0.01-0.05 in the recent literature.
 
-    Source: Wampler (1986); Nakamura & Hanafusa (1986), Inverse kinematic solutions with
-    singularity robustness for robot manipulator control.
+    Source: [Wampler1986], [NakamuraHanafusa1986].
     """
 
     damping: float = 0.05
@@ -39,12 +38,4 @@ class DampedLeastSquares:
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
         task = problem.primary
-        J = task.J
-        damped = J.dot(J.T)
-        damped.flat[:: len(damped) + 1] += self.damping**2
-        y = solve_positive_definite(damped, task.V)
-        if y is None:  # (almost) no damping, at a singularity
-            v: Array = pseudo_inverse(J, np.finfo(float).eps) @ task.V
-            return v
-        v = y.dot(J)
-        return v
+        return damped_least_squares(task.J, task.V, self.damping**2)

@@ -11,7 +11,7 @@ from dikbench.array import Array
 from dikbench.errors import DikbenchError
 from dikbench.problem import DikProblem, LimitKind, Solve
 from dikbench.quadratic_program import Program, QuadraticProgram
-from dikbench.tasks.posture import LinearizedPosture
+from dikbench.tasks.task import LinearizedJointTask
 from formulations.lu_kernel import lu_kernel
 
 REWARD = 100.0
@@ -37,7 +37,7 @@ class Drake:
         centering: K [1/s]; 0, Drake's default, penalises every null-space velocity; its manual's
             examples use 10.
 
-    Source: Drake 1.51, DoDifferentialInverseKinematics.
+    Source: [Drake], DoDifferentialInverseKinematics.
     """
 
     centering: float = 0.0
@@ -75,7 +75,7 @@ class Drake:
 def posture_error(problem: DikProblem) -> Array:
     """q_nom - q of the problem's first posture task, (nv,) [rad]; zero where there is none."""
     for task in problem.tasks:
-        if isinstance(task, LinearizedPosture):
+        if isinstance(task, LinearizedJointTask) and task.error.any():  # not one of damping
             return task.error
     return np.zeros(problem.robot.nv)
 

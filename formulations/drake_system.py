@@ -40,7 +40,7 @@ class DrakeSystem:
         tracking_weight: G; Drake's own default is 1, its manual advises 100.
         centering: K [1/s].
 
-    Source: Drake 1.51, DifferentialInverseKinematicsSystem (its recipe of least squares, joint
+    Source: [Drake], DifferentialInverseKinematicsSystem (its recipe of least squares, joint
     centring and joint velocity limits).
     """
 

@@ -39,8 +39,7 @@ class HierarchicalQp:
         rank_tolerance: singular values up to this count as zero (absolute, units of J).
         braking: how the box approaches a position limit (see `dikbench.box`).
 
-    Source: Kanoun, Lamiraux & Wieber (2011); Escande, Mansard & Wieber (2014), Hierarchical
-    quadratic programming.
+    Source: [Kanoun2011]; [Escande2014].
     """
 
     damping: float = 1e-3

@@ -32,8 +32,7 @@ class JointCentering:
             it centring leaks into the task.
         rank_tolerance: singular values of J up to this count as zero (absolute, units of J).
 
-    Source: Liegeois (1977), Automatic supervisory control of the configuration and behavior of
-    multibody mechanisms [Liegeois1977].
+    Source: [Liegeois1977].
     """
 
     gain: float = 1.0

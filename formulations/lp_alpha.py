@@ -32,7 +32,7 @@ class LpAlpha:
         regularization: rho; None: 1e-4 if the arm has more joints than the task has rows, else 0.
         braking: how the box approaches a position limit (see `dikbench.box`).
 
-    Source: Tedrake, Robotic Manipulation, ch. 3 (differential inverse kinematics in Drake).
+    Source: [Tedrake], chapter 3.
     """
 
     regularization: float | None = None

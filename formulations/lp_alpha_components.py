@@ -39,7 +39,7 @@ class LpAlphaComponents:
     Raises:
         Infeasible: near cos(pitch) = 0, where E has no inverse.
 
-    Source: Tedrake, Robotic Manipulation, ch. 3 (the component-wise relaxation for teleoperation).
+    Source: [Tedrake] (the component-wise relaxation for teleoperation).
     """
 
     regularization: float | None = None

@@ -31,7 +31,7 @@ class LpAlphaCvxpy:
         regularization: rho; None: 1e-4 if the arm has more joints than the task has rows, else 0.
         braking: how the box approaches a position limit (see `dikbench.box`).
 
-    Source: Tedrake, Robotic Manipulation, ch. 3; Diamond & Boyd (2016), CVXPY.
+    Source: [Tedrake], chapter 3; [DiamondBoyd2016].
     """
 
     regularization: float | None = None

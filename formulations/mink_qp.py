@@ -29,7 +29,7 @@ class MinkQp:
         lm_damping: factor of the damping by the squared error of pose tasks.
         position_gain: share of the distance to a position limit per step.
 
-    Source: mink 1.3 (Zakka), solve_ik; where mink errs (it takes the derivative of the logarithm
+    Source: [Mink], solve_ik; where mink errs (it takes the derivative of the logarithm
     for the identity below a rotation of 1e-5 rad) this law does not.
     """
 

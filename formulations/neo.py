@@ -42,8 +42,7 @@ class Neo:
         stop_distance: rho_s [rad].
         influence_distance: rho_0 [rad].
 
-    Source: Haviland & Corke (2021), NEO: A novel expeditious optimisation algorithm for reactive
-    motion control of manipulators.
+    Source: [HavilandCorke2021].
     """
 
     velocity_weight: float = 0.01

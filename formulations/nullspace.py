@@ -33,9 +33,7 @@ class Nullspace:
         rank_tolerance: singular values of A_k up to this count as zero (absolute, units of J_k: a
             relative one explodes where nothing is left free).
 
-    Source: Nakamura, Hanafusa & Yoshikawa (1987), Task-priority based redundancy control; Siciliano
-    & Slotine (1991), A general framework for managing multiple tasks in highly redundant robotic
-    systems [Nakamura1987, Siciliano1991].
+    Source: [Nakamura1987] for two tasks, [SicilianoSlotine1991] for any number.
     """
 
     damping: float = 0.0

@@ -31,9 +31,8 @@ class NullspaceRobust:
         projector: whether what a task leaves free is computed without damping or with it.
         rank_tolerance: singular values up to this count as zero (absolute, units of J_k).
 
-    Source: Chiaverini (1997), Singularity-robust task-priority redundancy resolution for real-time
-    kinematic control of robot manipulators [Chiaverini1997]; more than two levels with the
-    projector of all levels above: Antonelli (2009) [Antonelli2009].
+    Source: [Chiaverini1997]; more than two levels with the projector of all levels above:
+    [Antonelli2009].
     """
 
     damping: float = 0.0

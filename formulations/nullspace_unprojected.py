@@ -29,7 +29,7 @@ class NullspaceUnprojected:
         rank_tolerance: singular values of J_k up to this count as zero (absolute, units of J_k).
 
     Source: lecture notes on differential inverse kinematics, "null space projection", first form;
-    compare Chiaverini (1997) [Chiaverini1997].
+    compare [Chiaverini1997].
     """
 
     rank_tolerance: float = 1e-6

@@ -29,7 +29,7 @@ class PinkQp:
         lm_damping: factor of the damping by the squared error of pose tasks.
         position_gain: share of the distance to a position limit per step.
 
-    Source: pin-pink 4.4 (Caron et al.), solve_ik.
+    Source: [Pink] 4.4, solve_ik.
     """
 
     damping: float = 1e-6

@@ -9,7 +9,8 @@ import numpy as np
 
 from dikbench.array import Array
 from dikbench.errors import DikbenchError
-from dikbench.linear_algebra import pseudo_inverse
+from dikbench.limits import Interval
+from dikbench.linear_algebra import least_norm
 from dikbench.problem import DikProblem, LimitKind, Solve
 
 
@@ -29,7 +30,7 @@ class PseudoInverse:
         after: what to do with a velocity outside the limits.
         rank_tolerance: singular values up to this count as zero (absolute, units of J).
 
-    Source: Whitney (1969), Resolved motion rate control of manipulators and human prostheses.
+    Source: [Whitney1969].
     """
 
     after: Literal["none", "clip", "scale"] = "none"
@@ -48,10 +49,13 @@ class PseudoInverse:
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
         task = problem.primary
-        v: Array = pseudo_inverse(task.J, self.rank_tolerance) @ task.V
+        v = least_norm(task.J, task.V, self.rank_tolerance)
         limit = problem.limits.joint.velocity
         if self.after == "none" or limit is None:
             return v
-        if self.after == "clip":
-            return np.clip(v, limit.lower, limit.upper)
-        return v / max(1.0, float(limit.usage(v).max()))
+        return np.clip(v, limit.lower, limit.upper) if self.after == "clip" else scaled(v, limit)
+
+
+def scaled(v: Array, limit: Interval) -> Array:
+    """The longest s v, s <= 1, inside the limits, (nv,)."""
+    return v / max(1.0, float(limit.usage(v).max()))

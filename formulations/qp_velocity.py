@@ -27,7 +27,7 @@ class QpVelocity:
         damping: lambda, unsquared; not zero by default, else the minimiser is not unique on a
             redundant arm.
 
-    Source: Tedrake, Robotic Manipulation, ch. 3 (the quadratic program with velocity constraints).
+    Source: [Tedrake] (the quadratic program with velocity constraints).
     """
 
     damping: float = 1e-3

@@ -31,8 +31,7 @@ class WeightedLeastNorm:
         damping: lambda, unsquared (units of J); 0 by default: the task exactly.
         rank_tolerance: singular values of J W^-1/2 up to this count as zero (absolute, units of J).
 
-    Source: Chan & Dubey (1995), A weighted least-norm solution based scheme for avoiding joint
-    limits for redundant joint manipulators [Chan1995].
+    Source: [ChanDubey1995].
     """
 
     damping: float = 0.0

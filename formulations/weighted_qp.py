@@ -34,8 +34,7 @@ class WeightedQp:
         position_gain: share of the distance to a limit per step under `gain` braking.
         log_derivative: whether to multiply tasks by the derivative of their logarithm.
 
-    Source: the lecture notes' QP (Tedrake, Robotic Manipulation, ch. 3); Caron's Pink for the
-    log-derivative.
+    Source: [Tedrake], chapter 3; [Pink] for the log-derivative.
     """
 
     damping: float = 1e-3

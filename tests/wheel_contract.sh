@@ -19,6 +19,7 @@ from pathlib import Path
 for package in (dikbench, formulations, scenarios):
     assert "site-packages" in package.__file__, package.__file__
     assert (Path(package.__file__).parent / "py.typed").is_file(), package
+assert (Path(formulations.__file__).parent / "REFERENCES.md").is_file()
 PY
 venv/bin/dikbench list
 venv/bin/pytest --import-mode=importlib test_contract.py

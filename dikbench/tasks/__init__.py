@@ -1,5 +1,7 @@
 """What can be wanted of a robot: one task per file."""
 
+from dikbench.tasks.centre_of_mass import CentreOfMassTask
+from dikbench.tasks.damping import DampingTask
 from dikbench.tasks.orientation import OrientationTask
 from dikbench.tasks.pose import PoseTask
 from dikbench.tasks.position import PositionTask
@@ -7,6 +9,8 @@ from dikbench.tasks.posture import PostureTask
 from dikbench.tasks.task import LinearizedTask, Task, TrackingTask
 
 __all__ = [
+    "CentreOfMassTask",
+    "DampingTask",
     "LinearizedTask",
     "OrientationTask",
     "PoseTask",

@@ -12,7 +12,7 @@ from dikbench.array import Array
 from dikbench.errors import DikbenchError
 from dikbench.kinematics import Kinematics
 from dikbench.robot import Robot, frame_id
-from dikbench.tasks.task import LinearizedTask
+from dikbench.tasks.task import LinearizedTask, check_weight
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +60,7 @@ class PoseTask:
             raise DikbenchError(
                 f"pose task: expected a pinocchio.SE3 as target, got {type(X_d).__name__}"
             )
+        check_weight("pose task", self.weight, len(robot.task_rows))
         relative = kinematics.placement(index).actInv(X_d)
         error: Array = pin.log6(relative).np
         V = self.gain * error

@@ -12,7 +12,7 @@ from dikbench.errors import DikbenchError
 from dikbench.kinematics import Kinematics
 from dikbench.linear_algebra import scaled_identity
 from dikbench.robot import Robot
-from dikbench.tasks.task import LinearizedTask
+from dikbench.tasks.task import LinearizedJointTask, LinearizedTask, check_weight
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,7 +22,7 @@ class PostureTask:
     Attributes:
         target: the posture q*, (nq,).
         gain: 1/s.
-        weight: see `LinearizedTask`.
+        weight: see `LinearizedTask`; one per joint (nv,) for joints that matter unlike.
         priority: see `LinearizedTask`; by default below the task of the end effector.
     """
 
@@ -41,26 +41,18 @@ class PostureTask:
         """The task at the configuration of `kinematics`.
 
         Raises:
-            DikbenchError: if the target is not an array of the robot's shape (nq,).
+            DikbenchError: if the target is not an array of the robot's shape (nq,), or the weights
+                do not fit the robot.
         """
         robot = kinematics.robot
         if not isinstance(self.target, np.ndarray) or self.target.shape != robot.q0.shape:
             shape = getattr(self.target, "shape", type(self.target).__name__)
             raise DikbenchError(f"posture task: expected shape ({robot.nq},), got {shape}")
+        check_weight("posture task", self.weight, robot.nv)
         error: Array = pin.difference(robot.model, kinematics.q, self.target)
-        return LinearizedPosture(
+        return LinearizedJointTask(
             scaled_identity(robot.nv, 1.0), self.gain * error, error, self.weight, self.priority
         )
-
-
-class LinearizedPosture(LinearizedTask, eq=False):
-    """A posture task at one configuration: J is the identity (shared: not to be written to)."""
-
-    def normal_equations(self, *, log_derivative: bool = False) -> tuple[Array, Array]:
-        """W and W V (see `LinearizedTask`): nothing to multiply."""
-        if type(self.weight) is float:
-            return scaled_identity(len(self.V), self.weight), self.V * self.weight
-        return self.J * self.weight, self.V * self.weight
 
 
 def middle_posture(robot: Robot) -> Array:

@@ -10,7 +10,9 @@ import numpy as np
 import scipy.linalg
 
 from dikbench.array import Array
+from dikbench.errors import DikbenchError
 from dikbench.kinematics import Kinematics
+from dikbench.linear_algebra import scaled_identity
 from dikbench.robot import Robot
 
 
@@ -55,6 +57,39 @@ class LinearizedTask(msgspec.Struct, eq=False):
             J, V = Jl @ J, Jl @ V
         weighted = J.T if type(self.weight) is float and self.weight == 1.0 else J.T * self.weight
         return weighted.dot(J), weighted.dot(V)
+
+
+class LinearizedJointTask(LinearizedTask, eq=False):
+    """A task on the joint velocities themselves: J is the identity (shared: not to be written to).
+
+    The weights are one number or one per joint, (nv,).
+    """
+
+    def normal_equations(self, *, log_derivative: bool = False) -> tuple[Array, Array]:
+        """W and W V (see `LinearizedTask`): nothing to multiply."""
+        if type(self.weight) is float:
+            return scaled_identity(len(self.V), self.weight), self.V * self.weight
+        return self.J * self.weight, self.V * self.weight
+
+
+def check_weight(task: str, weight: float | Array, rows: int) -> None:
+    """Check the weight of a task with so many rows, named for the message.
+
+    Raises:
+        DikbenchError: if it is not one finite number, at least 0, or one such number per row.
+    """
+    if type(weight) is float and 0 <= weight < np.inf:
+        return
+    try:
+        values = np.asarray(weight, dtype=float)
+        given = values.tolist()
+    except (TypeError, ValueError):
+        values, given = np.array(np.nan), repr(weight)
+    if values.shape not in {(), (rows,)} or not np.all((values >= 0) & (values < np.inf)):
+        raise DikbenchError(
+            f"{task}: weight: expected a number or {rows} numbers, finite and at least 0, "
+            f"got {given}"
+        )
 
 
 class Task(Protocol):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -17,7 +18,14 @@ from dikbench.kinematics import Kinematics
 from dikbench.problem import DikProblem
 from dikbench.robot import Robot
 from dikbench.robot_catalogue import load_robot
-from dikbench.tasks import LinearizedTask, PoseTask, PostureTask, Task
+from dikbench.tasks import (
+    CentreOfMassTask,
+    DampingTask,
+    LinearizedTask,
+    PoseTask,
+    PostureTask,
+    Task,
+)
 from dikbench.tasks.posture import middle_posture
 from dikbench.tasks.task import stacked
 
@@ -259,6 +267,131 @@ def test_a_planar_arm_keeps_three_rows() -> None:
     assert turned.V == pytest.approx([0.2, -0.2 * 0.5, 0.5])  # the lever of 0.2 m turns with it
     assert turned.log_derivative is not None
     assert turned.log_derivative.shape == (3, 3)
+
+
+# --- joints at rest, and the centre of mass
+
+
+@pytest.mark.parametrize("name", [*ROBOTS, "kinova"])
+def test_damping_task_wants_joints_at_rest(name: str) -> None:
+    """J = I and V = 0, one row per joint, wherever the robot is."""
+    robot = _robot(name)
+    task = DampingTask(weight=0.5).linearize(_at(robot, _random_q(robot, np.random.default_rng(9))))
+    assert np.array_equal(task.J, np.eye(robot.nv))
+    assert np.array_equal(task.V, np.zeros(robot.nv))
+    assert np.array_equal(task.error, np.zeros(robot.nv))
+    assert (task.weight, task.priority) == (0.5, 2)
+
+
+@pytest.mark.parametrize("name", [*ROBOTS, "kinova"])
+@settings(deadline=None, max_examples=10)
+@given(seed=seeds)
+def test_centre_of_mass_error_changes_as_the_jacobian_says(name: str, seed: int) -> None:
+    """d(error)/dv = -J at random configurations."""
+    robot, random = _robot(name), np.random.default_rng(seed)
+    q = _random_q(robot, random)
+    task = CentreOfMassTask(random.normal(size=3))
+    linearized = task.linearize(_at(robot, q))
+    assert linearized.J.shape == (3, robot.nv)
+    assert np.abs(linearized.J).max() > 1e-2
+    assert np.allclose(_error_derivative(robot, task, q), -linearized.J, atol=TOLERANCE)
+
+
+def test_centre_of_mass_by_hand() -> None:
+    """Three links of 1 kg, stretched along x: the mean of their middles, and its levers."""
+    robot = load_robot("planar3r")
+    task = CentreOfMassTask([0.5, 0.1, 0.0], gain=2.0, weight=3.0, priority=1)  # type: ignore[arg-type]
+    linear = task.linearize(_at(robot, np.zeros(3)))
+    middles = np.array([0.2, 0.4 + 0.15, 0.4 + 0.3 + 0.1])
+    assert linear.error == pytest.approx([0.5 - middles.mean(), 0.1, 0], abs=1e-12)
+    assert linear.V == pytest.approx(2 * linear.error)
+    levers = [middles.sum() / 3, (0.15 + 0.4) / 3, 0.1 / 3]
+    assert linear.J == pytest.approx(np.array([[0, 0, 0], levers, [0, 0, 0]]), abs=1e-12)
+    assert (linear.weight, linear.priority) == (3.0, 1)
+
+
+def test_centre_of_mass_task_drives_towards_its_target() -> None:
+    """Following J v = V for a small step shortens the error by gain dt, in every axis."""
+    robot, random = load_robot("ur5"), np.random.default_rng(10)
+    for _ in range(5):
+        q = _random_q(robot, random, 1.0)
+        reach = 0.02 * random.normal(size=3)
+        task = CentreOfMassTask(_at(robot, q).centre_of_mass()[0] + reach, gain=4.0)
+        before = task.linearize(_at(robot, q))
+        v = np.linalg.pinv(before.J) @ before.V
+        after = task.linearize(_at(robot, pin.integrate(robot.model, q, v * 1e-4)))
+        assert after.error == pytest.approx((1 - 4e-4) * before.error, abs=2e-7)
+
+
+def test_centre_of_mass_leaves_the_kinematics_as_they_are() -> None:
+    """Placements and Jacobians taken before and after it are the same, and are no views of it."""
+    robot = load_robot("panda")
+    kinematics = _at(robot, robot.q0 + 0.3)
+    J, X = kinematics.jacobian(robot.frame_id), kinematics.placement(robot.frame_id).copy()
+    task = CentreOfMassTask(np.zeros(3)).linearize(kinematics)
+    kept = task.J.copy(), task.error.copy()
+    assert np.array_equal(kinematics.jacobian(robot.frame_id), J)
+    assert np.array_equal(kinematics.placement(robot.frame_id).homogeneous, X.homogeneous)
+    kinematics.update(robot.q0)
+    kinematics.centre_of_mass()
+    assert np.array_equal(task.J, kept[0])
+    assert np.array_equal(task.error, kept[1])
+
+
+def test_a_robot_without_mass_has_no_centre_of_it() -> None:
+    """An error of one line that names the robot."""
+    robot = load_robot("planar3r")
+    model = pin.Model(robot.model)
+    model.inertias[:] = [pin.Inertia.Zero() for _ in model.inertias]
+    light = replace(robot, model=model, name="light")
+    with pytest.raises(DikbenchError, match="robot light has no mass"):
+        CentreOfMassTask(np.zeros(3)).linearize(_at(light, light.q0))
+
+
+@pytest.mark.parametrize("target", [[0, 0], [0, 0, np.nan], "here", None])
+def test_a_centre_of_mass_needs_three_finite_numbers(target: object) -> None:
+    """Checked where the task is made, in one line."""
+    with pytest.raises(DikbenchError, match="centre-of-mass task: expected"):
+        CentreOfMassTask(target)  # type: ignore[arg-type]
+
+
+# --- weights
+
+
+def _weighted(kind: str, robot: Robot, weight: object) -> LinearizedTask:
+    task: Task = {
+        "posture": lambda: PostureTask(robot.q0 + 0.1, weight=weight),  # type: ignore[arg-type]
+        "damping": lambda: DampingTask(weight=weight),  # type: ignore[arg-type]
+        "centre": lambda: CentreOfMassTask(np.ones(3), weight=weight),  # type: ignore[arg-type]
+        "pose": lambda: PoseTask(
+            _placement(robot, robot.q0),
+            weight=weight,  # type: ignore[arg-type]
+        ),
+    }[kind]()
+    return task.linearize(_at(robot, robot.q0 + 0.2))
+
+
+KINDS = {"posture": 7, "damping": 7, "centre": 3, "pose": 6}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_weights_are_a_number_or_one_per_row(kind: str) -> None:
+    """J^T W J and J^T W V with W = diag(w), for a float, an integer and a vector."""
+    robot, rows = load_robot("panda"), KINDS[kind]
+    for weight in (0.25, 2, np.float64(0.5), np.linspace(0, 1, rows), [0.3] * rows):
+        task = _weighted(kind, robot, weight)
+        W = np.diag(np.broadcast_to(weight, rows))
+        square, pull = task.normal_equations()
+        assert square == pytest.approx(task.J.T @ W @ task.J, abs=1e-14)
+        assert pull == pytest.approx(task.J.T @ W @ task.V, abs=1e-14)
+
+
+@pytest.mark.parametrize("weight", [-1.0, float("nan"), float("inf"), np.ones(5), "heavy", None])
+@pytest.mark.parametrize("kind", KINDS)
+def test_wrong_weights_are_errors_of_one_line(kind: str, weight: object) -> None:
+    """Which task, what was given, and how many numbers would be valid."""
+    with pytest.raises(DikbenchError, match=f"task: weight: expected a number or {KINDS[kind]}"):
+        _weighted(kind, load_robot("panda"), weight)
 
 
 # --- several tasks

@@ -1,0 +1,84 @@
+"""The pseudo-inverse, slowed down on the way into a singularity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.array import Array
+from dikbench.errors import DikbenchError
+from dikbench.linear_algebra import least_norm, thin_svd
+from dikbench.problem import DikProblem, LimitKind, Solve
+from dikbench.robot import Robot
+from formulations.pseudo_inverse import scaled
+
+
+@dataclass(frozen=True)
+class ConditionGovernor:
+    """Condition-number governor: slow down towards a singularity, stop before it, leave freely.
+
+        v = c J^+ V,   kappa = sigma_1/sigma_m
+        c = min(1, max(0, (kappa_stop - kappa)/(kappa_stop - kappa_slow)))  if dkappa/dt > 0, else 1
+
+    then `after`: nothing, or scaled down into the velocity limits. J (m, nv) and V (m,) are the
+    primary task's, in the task frame; v in rad/s. kappa and its derivative along J^+ V are those of
+    the robot's task frame (body Jacobian, units m and rad), whatever the task. On course and
+    sheltered from singularities, in which it stops for good if the course leads through one;
+    leaving is not slowed down, so that it cannot lock. Weights play no part.
+
+    The source judges whether the motion approaches by a probing step along u_m; here
+    dsigma_i/dt = u_i^T dJ/dt v_i is exact. Its later versions also slow leaving down, over twice
+    the range, and stop above kappa_stop whatever the direction.
+
+    Attributes:
+        slow: kappa_slow, where slowing down begins.
+        stop: kappa_stop, where approaching ends.
+        after: what to do with a velocity outside the limits; the source scales.
+        rank_tolerance: singular values up to this count as zero (absolute, units of J); such a
+            frame is at its singularity and can only leave it.
+
+    Source: [MoveItServo], first version.
+    """
+
+    slow: float = 17.0
+    stop: float = 30.0
+    after: Literal["none", "scale"] = "scale"
+    rank_tolerance: float = 1e-6
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        if not 1 <= self.slow < self.stop < np.inf:
+            raise DikbenchError("condition-governor: expected 1 <= slow < stop, both finite")
+        if not 0 <= self.rank_tolerance < np.inf:
+            raise DikbenchError("condition-governor: rank_tolerance must be finite and at least 0")
+
+    @property
+    def keeps(self) -> frozenset[LimitKind]:
+        """The velocity limits, unless nothing is done after the inverse."""
+        return frozenset() if self.after == "none" else frozenset({"velocity"})
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        task = problem.primary
+        v = least_norm(task.J, task.V, self.rank_tolerance)
+        v *= self._scale(problem.robot, problem.q, v)
+        limit = problem.limits.joint.velocity
+        return v if self.after == "none" or limit is None else scaled(v, limit)
+
+    def _scale(self, robot: Robot, q: Array, v: Array) -> float:
+        """The factor c for a velocity (nv,) at a configuration (nq,)."""
+        rows, data = list(robot.task_rows), robot.scratch
+        pin.computeJointJacobiansTimeVariation(robot.model, data, q, v)
+        J = pin.getFrameJacobian(robot.model, data, robot.frame_id, pin.LOCAL)[rows]
+        U, sigma, Vt = thin_svd(J)
+        largest, smallest = sigma[0], sigma[-1]
+        if largest <= self.slow * smallest or smallest <= self.rank_tolerance:
+            return 1.0
+        rate = pin.getFrameJacobianTimeVariation(robot.model, data, robot.frame_id, pin.LOCAL)[rows]
+        growth, fall = (U[:, i].dot(rate).dot(Vt[i]) for i in (0, -1))
+        if growth * smallest <= largest * fall:
+            return 1.0
+        return max(0.0, (self.stop - float(largest / smallest)) / (self.stop - self.slow))

@@ -1,0 +1,53 @@
+"""The Jacobian transpose."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dikbench.array import Array
+from dikbench.errors import DikbenchError
+from dikbench.problem import DikProblem, Solve
+
+
+@dataclass(frozen=True)
+class JacobianTranspose:
+    """Jacobian transpose: steepest descent on the task's error, with the best step.
+
+        v = a J^T V,   a = <V, J J^T V> / ||J J^T V||^2
+
+    J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s. a minimises
+    ||a J J^T V - V||. Needs no inverse and nothing blows up at a singularity, but it is off course
+    wherever J J^T V is not along V: the directions that the arm does badly are hardly done at all.
+    Knows no limits; weights play no part.
+
+    Attributes:
+        rank_tolerance: V is taken as lost, and v = 0, where ||J^T V|| is up to this share of ||V||
+            (absolute, units of J); hence ||v|| <= ||V|| / rank_tolerance.
+
+    Source: [WolovichElliott1984], [Balestrino1984]; the step is that of [Buss2004].
+    """
+
+    rank_tolerance: float = 1e-6
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        if not 0 < self.rank_tolerance < np.inf:
+            raise DikbenchError("jacobian-transpose: rank_tolerance must be finite and positive")
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        task = problem.primary
+        J, V = task.J, task.V
+        largest = float(np.abs(V).max())
+        if largest == 0:
+            return np.zeros(J.shape[1])
+        direction = V / largest  # its squares neither underflow nor overflow
+        g = direction.dot(J)
+        steepness = float(g.dot(g))
+        if steepness <= self.rank_tolerance**2 * float(direction.dot(direction)):
+            return np.zeros(J.shape[1])
+        motion = J.dot(g)
+        v: Array = g * (largest * steepness / float(motion.dot(motion)))
+        return v

@@ -1,0 +1,50 @@
+"""J-PARSE: the wanted motion projected on what the arm can do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dikbench.array import Array
+from dikbench.errors import DikbenchError
+from dikbench.linear_algebra import thin_svd
+from dikbench.problem import DikProblem, Solve
+
+
+@dataclass(frozen=True)
+class JParse:
+    """J-PARSE: a safe inverse of the motion, its nearly lost directions scaled down.
+
+        v = sum_i g_i v_i (u_i . V),   g_i = 1/sigma_i                  if sigma_i > gamma sigma_1
+                                             sigma_i/(gamma sigma_1)^2  else
+
+    J = sum_i sigma_i u_i v_i^T (m, nv) and V (m,) are the primary task's, in the task frame; v in
+    rad/s. Continuous, bounded by ||V|| / (gamma sigma_1) and the pseudo-inverse away from
+    singularities; into a singularity it slows down, and out of one it starts slowly. gamma sigma_1
+    may be large: the arms here count as nearly singular at many an ordinary posture. Knows no
+    limits; weights play no part.
+
+    Attributes:
+        threshold: gamma, the share of the largest singular value up to which a direction counts as
+            nearly lost (the source lets those have gains of their own, here 1).
+
+    Source: [Guptasarma2025].
+    """
+
+    threshold: float = 0.1
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        if not 0 < self.threshold < 1:
+            raise DikbenchError("jparse: threshold must be between 0 and 1")
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        task = problem.primary
+        U, sigma, Vt = thin_svd(task.J)
+        if sigma[0] == 0:
+            return np.zeros(Vt.shape[1])
+        safe = np.maximum(sigma, self.threshold * sigma[0])
+        v: Array = (sigma / safe / safe * task.V.dot(U)).dot(Vt)
+        return v

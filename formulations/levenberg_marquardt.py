@@ -1,0 +1,50 @@
+"""Damping that grows with the task's error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dikbench.array import Array
+from dikbench.errors import DikbenchError
+from dikbench.linear_algebra import damped_least_squares
+from dikbench.problem import DikProblem, Solve
+
+
+@dataclass(frozen=True)
+class LevenbergMarquardt:
+    """Levenberg-Marquardt: damped least squares, the more damped the larger the error.
+
+        v = (J^T W J + lambda^2 I)^-1 J^T W V,   lambda^2 = k E + damping^2,   E = 1/2 e^T W e
+
+    J (m, nv), V (m,), the error e (m,) and the weights W are the primary task's, in the task
+    frame; v in rad/s. Three rules in two numbers: Chan & Lawrence k > 0, damping 0; Sugihara k = 1,
+    damping > 0 (his bias is damping^2, the same for all joints); Wampler's fixed damping k = 0,
+    with W = I the law `dls`. Careful far from a target out of reach, exact at the target; on course
+    E is small, and only the fixed share protects at a singularity. The sources take displacements,
+    with V = e. Knows no limits.
+
+    Attributes:
+        error_factor: k; 0.1-1 in the literature.
+        damping: the fixed share, unsquared; a bias of 1e-4 to 1e-3 in the literature.
+
+    Source: [ChanLawrence1988], [Sugihara2011]; [Wampler1986] for the fixed damping.
+    """
+
+    error_factor: float = 1.0
+    damping: float = 0.01
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        for name in ("error_factor", "damping"):
+            if not 0 <= getattr(self, name) < np.inf:
+                raise DikbenchError(f"lm: {name} must be finite and at least 0")
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        task = problem.primary
+        root = np.sqrt(np.broadcast_to(task.weight, task.V.shape))
+        error = root * task.error
+        squared = 0.5 * self.error_factor * float(error.dot(error)) + self.damping**2
+        return damped_least_squares(root[:, None] * task.J, root * task.V, squared)

@@ -1,0 +1,49 @@
+"""Damped least squares whose damping is switched on by the manipulability."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dikbench.array import Array
+from dikbench.errors import DikbenchError
+from dikbench.linear_algebra import damped_least_squares, volume
+from dikbench.problem import DikProblem, Solve
+
+
+@dataclass(frozen=True)
+class ManipulabilityDamping:
+    """Damped least squares where the manipulability is low, the pseudo-inverse elsewhere.
+
+        v = J^T (J J^T + lambda^2 I)^-1 V,   w = sqrt(det(J J^T))
+        lambda^2 = lambda_0^2 (1 - w/w_0)^2  if w < w_0,  else 0
+
+    J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s. Exact away from
+    singularities and continuous at w_0; but w is a product of all singular values in units of its
+    own, which says little about the smallest and has to be tuned to each arm (with more rows than
+    joints it is always 0). Knows no limits; weights play no part.
+
+    Attributes:
+        damping: lambda_0, unsquared (units of J), at the singularity itself.
+        threshold: w_0, the manipulability below which there is damping (units of det J); the source
+            leaves it to the arm: the arms here have 0.06 to 0.3 at their safe starts.
+
+    Source: [NakamuraHanafusa1986].
+    """
+
+    damping: float = 0.05
+    threshold: float = 0.02
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        if not 0 <= self.damping < np.inf:
+            raise DikbenchError("dls-manipulability: damping must be finite and at least 0")
+        if not 0 < self.threshold < np.inf:
+            raise DikbenchError("dls-manipulability: threshold must be finite and positive")
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        task = problem.primary
+        damping = self.damping * max(0.0, 1.0 - volume(task.J) / self.threshold)
+        return damped_least_squares(task.J, task.V, damping**2)

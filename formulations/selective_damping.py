@@ -1,0 +1,79 @@
+"""Selectively damped least squares."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+
+from dikbench.array import Array
+from dikbench.errors import DikbenchError
+from dikbench.linear_algebra import thin_svd
+from dikbench.problem import DikProblem, Solve
+
+NO_RESPONSE: Final = 1e-10
+"""Singular values up to this are skipped, as in the authors' code."""
+
+
+@dataclass(frozen=True)
+class SelectiveDamping:
+    """Selectively damped least squares: limit each singular direction by its own reach.
+
+        phi_i   = v_i (u_i . V) / sigma_i
+        N_i     = sum_k ||u_i^(k)||,   M_i = (1/sigma_i) sum_j |v_ji| sum_k ||J_j^(k)||
+        gamma_i = min(1, N_i/M_i) gamma_max
+        hard:  v = clamp(sum_i clamp(phi_i, gamma_i), gamma_max),
+               clamp(x, g) = x min(1, g / max|x|)
+        soft:  phi_i gamma_i/(gamma_i + max|phi_i|); the sum s where max|s| > gamma_max likewise:
+               v = s gamma_max/(gamma_max + max|s|)
+
+    J = sum_i sigma_i u_i v_i^T (m, nv) and V (m,) are the primary task's, in the task frame; v in
+    rad/s. x^(k) is the share of the k-th end effector, here of the k-th task of first priority
+    (the source's have three rows each, and a pose counts as one). No joint is faster than
+    gamma_max and a nearly lost direction is hardly moved, without any damping elsewhere; the soft
+    one is off course everywhere, and jumps to half where the sum reaches gamma_max. Knows no
+    limits; weights play no part.
+
+    Attributes:
+        max_rate: gamma_max [rad/s]. The source limits displacements, to pi/4 in an iteration; as
+            a rate the default is about a joint's speed limit.
+        clamp: hard, as in the paper, or soft, as in the authors' published code.
+
+    Source: [BussKim2005].
+    """
+
+    max_rate: float = 2.0
+    clamp: Literal["hard", "soft"] = "hard"
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        if not 0 < self.max_rate < np.inf:
+            raise DikbenchError("sdls: max_rate must be finite and positive")
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        task = problem.primary
+        U, sigma, Vt = thin_svd(task.J)
+        moved = np.count_nonzero(sigma > NO_RESPONSE)
+        U, sigma, Vt = U[:, :moved], sigma[:moved], Vt[:moved]
+        priority = problem.tasks[0].priority
+        sizes = [len(other.V) for other in problem.tasks if other.priority == priority]
+        N, reach = _lengths(U, sizes), _lengths(task.J, sizes)
+        size = np.abs(Vt)
+        gamma = np.minimum(1.0, N * sigma / size.dot(reach)) * self.max_rate
+        response = task.V.dot(U) / sigma
+        largest = np.abs(response) * size.max(axis=1)
+        if self.clamp == "soft":
+            v: Array = (response * gamma / (gamma + largest)).dot(Vt)
+            fastest = float(np.abs(v).max())
+            return v * (self.max_rate / (self.max_rate + fastest) if fastest > self.max_rate else 1)
+        v = (response * gamma / np.maximum(gamma, largest)).dot(Vt)
+        return v * (self.max_rate / max(self.max_rate, float(np.abs(v).max())))
+
+
+def _lengths(columns: Array, sizes: list[int]) -> Array:
+    """Of each column (m, n) the sum of the norms of its blocks, (n,)."""
+    starts = np.cumsum([0, *sizes[:-1]])
+    lengths: Array = np.sqrt(np.add.reduceat(columns**2, starts)).sum(axis=0)
+    return lengths

@@ -1,0 +1,51 @@
+"""The pseudo-inverse with filtered singular values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dikbench.array import Array
+from dikbench.errors import DikbenchError
+from dikbench.linear_algebra import thin_svd
+from dikbench.problem import DikProblem, Solve
+
+
+@dataclass(frozen=True)
+class SingularValueFiltering:
+    """Singular value filtering: invert singular values that never get below a smallest one.
+
+        v = sum_i v_i (u_i . V) / h(sigma_i)
+        h(s) = (s^3 + nu s^2 + 2 s + 2 s_0) / (s^2 + nu s + 2) = s + 2 s_0 / (s^2 + nu s + 2)
+
+    J = sum_i sigma_i u_i v_i^T (m, nv) and V (m,) are the primary task's, in the task frame; v in
+    rad/s. h(0) = s_0 and h rises, hence ||v|| <= ||V|| / s_0, also where rank is lost. Smooth and
+    nearly exact away from singularities; at one it does not slow down: the lost direction is asked
+    for at 1/s_0, in a joint direction v_m that is then chance. Knows no limits; weights play no
+    part.
+
+    Attributes:
+        smallest: s_0, the value that a lost singular value is taken for (units of J); 0.005-0.01.
+        shape: nu, how soon h follows s; between s_0 and 2/s_0, where h rises.
+
+    Source: [ColomeTorras2015].
+    """
+
+    smallest: float = 0.01
+    shape: float = 10.0
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        if not 0 < self.smallest < np.inf:
+            raise DikbenchError("sv-filter: smallest must be finite and positive")
+        if not self.smallest < self.shape < 2 / self.smallest:
+            raise DikbenchError("sv-filter: shape must be between smallest and 2 / smallest")
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        task = problem.primary
+        U, sigma, Vt = thin_svd(task.J)
+        filtered = sigma + 2 * self.smallest / ((sigma + self.shape) * sigma + 2)
+        v: Array = (task.V.dot(U) / filtered).dot(Vt)
+        return v

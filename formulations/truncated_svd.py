@@ -1,0 +1,46 @@
+"""The pseudo-inverse without the directions that the arm does badly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dikbench.array import Array
+from dikbench.errors import DikbenchError
+from dikbench.linear_algebra import thin_svd
+from dikbench.problem import DikProblem, Solve
+
+
+@dataclass(frozen=True)
+class TruncatedSvd:
+    """Truncated singular value decomposition: give up the directions that are nearly lost.
+
+        v = sum_i v_i (u_i . V) / sigma_i   over sigma_i > c sigma_1
+
+    J = sum_i sigma_i u_i v_i^T (m, nv) and V (m,) are the primary task's, in the task frame; v in
+    rad/s. Bounded by ||V|| / (c sigma_1) and the pseudo-inverse where nothing is given up; jumps,
+    and chatters in closed loop, where a singular value crosses the threshold. Knows no limits;
+    weights play no part.
+
+    Attributes:
+        relative_tolerance: c, the share of the largest singular value up to which one is dropped;
+            0.01 in the source's published code.
+
+    Source: [Buss2004].
+    """
+
+    relative_tolerance: float = 0.01
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        if not 0 <= self.relative_tolerance < 1:
+            raise DikbenchError("tsvd: relative_tolerance must be at least 0 and below 1")
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        task = problem.primary
+        U, sigma, Vt = thin_svd(task.J)
+        kept = np.count_nonzero(sigma > self.relative_tolerance * sigma[0])
+        v: Array = (task.V.dot(U[:, :kept]) / sigma[:kept]).dot(Vt[:kept])
+        return v

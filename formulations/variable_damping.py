@@ -1,0 +1,67 @@
+"""Damped least squares whose damping grows as the smallest singular value falls."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from dikbench.array import Array
+from dikbench.errors import DikbenchError
+from dikbench.linear_algebra import thin_svd
+from dikbench.problem import DikProblem, Solve
+
+
+@dataclass(frozen=True)
+class VariableDamping:
+    """Variable damping: damp near a singularity only, and only the direction that is lost there.
+
+        numerical:  v = J^T (J J^T + beta^2 I + lambda^2 u_m u_m^T)^-1 V
+        isotropic:  v = J^T (J J^T + beta^2 I + lambda^2 I)^-1 V
+        lambda^2 = (1 - (sigma_m/eps)^2) lambda_max^2  if sigma_m < eps,  else 0
+
+    with sigma_m the smallest singular value of J and u_m its left singular vector. J (m, nv) and
+    V (m,) are the primary task's, in the task frame; v in rad/s. Exact away from singularities
+    and, with numerical filtering, in the directions that stay; where two directions are lost at
+    once only beta damps the second. Knows no limits; weights play no part.
+
+    Attributes:
+        damping: lambda_max, unsquared (units of J); 0.02-0.1 in the literature.
+        threshold: eps, the singular value below which there is damping; 0.02-0.1 in the literature.
+        isotropic_damping: beta, unsquared; much smaller than lambda_max where it is used.
+        filtering: whether lambda damps the last direction alone or all of them.
+        rank_tolerance: singular values that are no larger than this when damped are not inverted
+            (absolute, units of J).
+
+    Source: [MaciejewskiKlein1988] (numerical filtering), [Egeland1991] (lambda),
+    [Chiaverini1994] (both, and beta).
+    """
+
+    damping: float = 0.05
+    threshold: float = 0.05
+    isotropic_damping: float = 0.0
+    filtering: Literal["numerical", "isotropic"] = "numerical"
+    rank_tolerance: float = 1e-6
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        for name in ("damping", "isotropic_damping", "rank_tolerance"):
+            if not 0 <= getattr(self, name) < np.inf:
+                raise DikbenchError(f"dls-variable: {name} must be finite and at least 0")
+        if not 0 < self.threshold < np.inf:
+            raise DikbenchError("dls-variable: threshold must be finite and positive")
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        task = problem.primary
+        U, sigma, Vt = thin_svd(task.J)
+        squares = sigma**2 + self.isotropic_damping**2
+        nearness = 1.0 - (sigma[-1] / self.threshold) ** 2
+        if nearness > 0:
+            damped = slice(-1, None) if self.filtering == "numerical" else slice(None)
+            squares[damped] += nearness * self.damping**2
+        gains = np.zeros_like(sigma)
+        np.divide(sigma, squares, out=gains, where=squares > self.rank_tolerance**2)
+        v: Array = (gains * task.V.dot(U)).dot(Vt)
+        return v

@@ -1,0 +1,42 @@
+"""The references page: every key that a law names, and no other."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import formulations
+from dikbench.listing import listing
+from dikbench.registry import plugins
+from formulations import FORMULATIONS
+
+FOLDER = Path(formulations.__file__).parent
+KEY = re.compile(r"\[([A-Z]\w+)\]")
+SOURCES = {name: plugins("formulation")[name].source for name in FORMULATIONS}
+ENTRIES = re.findall(r"^- \*\*\[(\w+)\]\*\*", (FOLDER / "REFERENCES.md").read_text(), re.MULTILINE)
+
+
+def test_every_law_names_sources_that_the_page_resolves() -> None:
+    """Each law has a source with at least one key, and every key has an entry."""
+    for name, source in SOURCES.items():
+        keys = KEY.findall(source)
+        assert keys, name
+        assert set(keys) <= set(ENTRIES), name
+
+
+def test_every_entry_of_the_page_is_used() -> None:
+    """No reference stands there that no law's source names."""
+    used = {key for source in SOURCES.values() for key in KEY.findall(source)}
+    assert set(ENTRIES) - used == set()
+
+
+def test_entries_are_in_alphabetical_order_and_single() -> None:
+    """So that a reader finds them, and nobody adds one twice."""
+    assert sorted(set(ENTRIES), key=str.lower) == ENTRIES
+
+
+def test_the_list_of_laws_shows_the_keys_once_bracketed() -> None:
+    """A line is name, summary and keys, as in `pinv  Resolved-rate control: ... [Whitney1969]`."""
+    lines = listing("formulations")
+    assert any(line.startswith("pinv ") and line.endswith(" [Whitney1969]") for line in lines)
+    assert not any("[[" in line or "]]" in line for line in lines)
