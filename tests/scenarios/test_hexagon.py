@@ -135,7 +135,7 @@ def test_where_no_motion_is_fast_enough_laws_clip_or_fall_behind(metrics: Metric
 @pytest.mark.parametrize(
     ("limits", "words"),
     [
-        ({"position": (-6.0, 6.0)}, "least margin of the least-norm motion"),
+        ({"position": (-6.0, 6.0)}, "margin of the least-norm motion"),
         ({"velocity": 20.0}, "required speed over limit"),
     ],
 )
