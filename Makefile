@@ -35,7 +35,10 @@ benchmark-scenarios:  ## how long each scenario takes to build
 mutation:        ## which changes to the laws and limits no test notices (hours; see pyproject.toml)
 	$(PYTHON) -m pip install --quiet mutmut && $(PYTHON) -m mutmut run $(MUTANTS)
 
+benchmark-laws:  ## what the laws without a solver cost, as ratios to dls
+	$(PYTHON) tests/benchmarks/laws.py
+
 constraints:     ## the installed versions become the tested ones
 	.venv/bin/pip freeze --exclude-editable --exclude pip --exclude setuptools > constraints.txt
 
-.PHONY: help setup test test-long lint format contract quick benchmark benchmark-scenarios mutation constraints
+.PHONY: help setup test test-long lint format contract quick benchmark benchmark-scenarios benchmark-laws mutation constraints

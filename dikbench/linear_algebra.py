@@ -19,20 +19,27 @@ def thin_svd(A: Array) -> tuple[Array, Array, Array]:
     return U, singular, Vt
 
 
+def rank(singular: Array, tolerance: float) -> int:
+    """How many of the singular values (k,), falling, are above a tolerance; NaN counts as above."""
+    return len(singular) - int(np.count_nonzero(singular <= tolerance))
+
+
 def pseudo_inverse(A: Array, tolerance: float) -> Array:
     """Moore-Penrose inverse (n, m) of A (m, n), singular values up to `tolerance` taken as zero.
 
     The tolerance is absolute, in the units of A: a relative one blows up where A itself vanishes.
     """
     U, singular, Vt = thin_svd(A)
-    result: Array = (Vt.T * _inverted(singular, tolerance)) @ U.T
+    k = rank(singular, tolerance)
+    result: Array = (Vt[:k].T / singular[:k]) @ U[:, :k].T
     return result
 
 
 def least_norm(A: Array, b: Array, tolerance: float) -> Array:
     """The shortest least-squares solution of A x = b, (n,): `pseudo_inverse` times b (m,)."""
     U, singular, Vt = thin_svd(A)
-    x: Array = (_inverted(singular, tolerance) * b.dot(U)).dot(Vt)
+    k = rank(singular, tolerance)
+    x: Array = (b.dot(U[:, :k]) / singular[:k]).dot(Vt[:k])
     return x
 
 
@@ -49,13 +56,6 @@ def damped_least_squares(A: Array, b: Array, squared_damping: float) -> Array:
     if y is None:  # (almost) no damping, at a singularity
         return least_norm(A, b, np.finfo(float).eps)
     return y.dot(A) if m <= n else y
-
-
-def _inverted(singular: Array, tolerance: float) -> Array:
-    kept = singular > tolerance
-    inverse = np.zeros_like(singular)
-    inverse[kept] = 1.0 / singular[kept]
-    return inverse
 
 
 @lru_cache(maxsize=64)

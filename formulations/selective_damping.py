@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import Final, Literal
 
 import numpy as np
 
 from dikbench.array import Array
 from dikbench.errors import DikbenchError
-from dikbench.linear_algebra import thin_svd
+from dikbench.linear_algebra import rank, thin_svd
 from dikbench.problem import DikProblem, Solve
 
 NO_RESPONSE: Final = 1e-10
@@ -55,11 +56,12 @@ class SelectiveDamping:
         """See `Formulation`."""
         task = problem.primary
         U, sigma, Vt = thin_svd(task.J)
-        moved = np.count_nonzero(sigma > NO_RESPONSE)
-        U, sigma, Vt = U[:, :moved], sigma[:moved], Vt[:moved]
+        k = rank(sigma, NO_RESPONSE)
+        U, sigma, Vt = U[:, :k], sigma[:k], Vt[:k]
         priority = problem.tasks[0].priority
-        sizes = [len(other.V) for other in problem.tasks if other.priority == priority]
-        N, reach = _lengths(U, sizes), _lengths(task.J, sizes)
+        rows = accumulate(len(other.V) for other in problem.tasks if other.priority == priority)
+        starts = [0, *rows][:-1]
+        N, reach = _lengths(U, starts), _lengths(task.J, starts)
         size = np.abs(Vt)
         gamma = np.minimum(1.0, N * sigma / size.dot(reach)) * self.max_rate
         response = task.V.dot(U) / sigma
@@ -72,8 +74,7 @@ class SelectiveDamping:
         return v * (self.max_rate / max(self.max_rate, float(np.abs(v).max())))
 
 
-def _lengths(columns: Array, sizes: list[int]) -> Array:
-    """Of each column (m, n) the sum of the norms of its blocks, (n,)."""
-    starts = np.cumsum([0, *sizes[:-1]])
+def _lengths(columns: Array, starts: list[int]) -> Array:
+    """Of each column (m, n) the sum of the norms of its blocks, (n,), that start at these rows."""
     lengths: Array = np.sqrt(np.add.reduceat(columns**2, starts)).sum(axis=0)
     return lengths

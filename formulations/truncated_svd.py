@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from dikbench.array import Array
 from dikbench.errors import DikbenchError
-from dikbench.linear_algebra import thin_svd
+from dikbench.linear_algebra import rank, thin_svd
 from dikbench.problem import DikProblem, Solve
 
 
@@ -41,6 +39,6 @@ class TruncatedSvd:
         """See `Formulation`."""
         task = problem.primary
         U, sigma, Vt = thin_svd(task.J)
-        kept = np.count_nonzero(sigma > self.relative_tolerance * sigma[0])
-        v: Array = (task.V.dot(U[:, :kept]) / sigma[:kept]).dot(Vt[:kept])
+        k = rank(sigma, self.relative_tolerance * float(sigma[0]))
+        v: Array = (task.V.dot(U[:, :k]) / sigma[:k]).dot(Vt[:k])
         return v
