@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -12,9 +12,6 @@ from dikbench.errors import DikbenchError
 from dikbench.limits import Interval
 from dikbench.linear_algebra import least_norm
 from dikbench.problem import DikProblem, LimitKind, Solve
-
-TINY: Final = float(np.finfo(float).tiny)
-"""Stands for a bound of zero, which no velocity fits into."""
 
 
 @dataclass(frozen=True)
