@@ -72,12 +72,14 @@ class ConditionGovernor:
         """The factor c for a velocity (nv,) at a configuration (nq,)."""
         rows, data = list(robot.task_rows), robot.scratch
         pin.computeJointJacobiansTimeVariation(robot.model, data, q, v)
-        J = pin.getFrameJacobian(robot.model, data, robot.frame_id, pin.LOCAL)[rows]
+        local = (robot.model, data, robot.frame_id, pin.LOCAL)
+        # Of a single joint Pinocchio makes a vector.
+        J = pin.getFrameJacobian(*local).reshape(6, -1)[rows]
         U, sigma, Vt = thin_svd(J)
         largest, smallest = sigma[0], sigma[-1]
         if largest <= self.slow * smallest or smallest <= self.rank_tolerance:
             return 1.0
-        rate = pin.getFrameJacobianTimeVariation(robot.model, data, robot.frame_id, pin.LOCAL)[rows]
+        rate = pin.getFrameJacobianTimeVariation(*local).reshape(6, -1)[rows]
         growth, fall = (U[:, i].dot(rate).dot(Vt[i]) for i in (0, -1))
         if growth * smallest <= largest * fall:
             return 1.0

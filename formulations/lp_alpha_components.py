@@ -37,7 +37,8 @@ class LpAlphaComponents:
         braking: how the box approaches a position limit (see `dikbench.box`).
 
     Raises:
-        Infeasible: near cos(pitch) = 0, where E has no inverse.
+        Infeasible: near cos(pitch) = 0, where E has no inverse; if the task is neither a pose nor a
+            position.
 
     Source: [Tedrake] (the component-wise relaxation for teleoperation).
     """
@@ -59,9 +60,8 @@ class LpAlphaComponents:
         m, n = task.J.shape
         pin.forwardKinematics(robot.model, robot.scratch, problem.q)
         rotation = pin.updateFramePlacement(robot.model, robot.scratch, robot.frame_id).rotation
-        E = twist_from_rates(rotation)
-        if m != 6:
-            E = E[np.ix_(robot.task_rows, robot.task_rows)]
+        rows = _rows(robot.task_rows, m)
+        E = twist_from_rates(rotation)[np.ix_(rows, rows)]
         P = np.zeros((n + m, n + m))
         P[:n, :n].flat[:: n + 1] = regularization_for(task, self.regularization)
         q = np.concatenate([np.zeros(n), -np.ones(m)])
@@ -70,6 +70,14 @@ class LpAlphaComponents:
         lower = np.concatenate([box.lower, np.zeros(m)])
         upper = np.concatenate([box.upper, np.ones(m)])
         return solve(QuadraticProgram(P, q, A=A, b=np.zeros(m), lb=lower, ub=upper))[:n]
+
+
+def _rows(rows: tuple[int, ...], m: int) -> list[int]:
+    """The rows of the twist that a task of m rows is about: a whole pose, or a position."""
+    for kept in (list(rows), [row for row in rows if row < 3]):
+        if len(kept) == m:
+            return kept
+    raise Infeasible("components are those of a pose or a position, not of several tasks")
 
 
 def twist_from_rates(rotation: Array) -> Array:

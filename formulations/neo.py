@@ -33,7 +33,8 @@ class Neo:
     in rad/s; J_m the gradient of the manipulability sqrt det(J J^T), (nv,); rho_i the distance to
     the position limit ahead [rad], and likewise below. The slack grows dear as the error falls, so
     that the arm first seeks a better posture and then the target. Leaves the course to do so. On
-    arms of joints with one degree of freedom each. Weights play no part.
+    arms of joints with one degree of freedom each; the reward is left out where the task is not a
+    whole pose. Weights play no part.
 
     Attributes:
         velocity_weight: lambda_v.
@@ -74,7 +75,7 @@ class Neo:
         scale = min(1.0, 1 / price)
         P = np.diag(scale * np.concatenate([np.full(n, self.velocity_weight), np.full(m, price)]))
         q = np.zeros(n + m)
-        if self.manipulability_gain:
+        if self.manipulability_gain and m == len(problem.robot.task_rows):
             q[:n] = -scale * self.manipulability_gain * manipulability_gradient(task.J)
         lower, upper = self._bounds(problem.limits)
         slack = np.full(m, LARGEST_SLACK)
