@@ -48,7 +48,7 @@ class Kinematics:
 
         Not finite if the model has no mass.
         """
-        J: Array = pin.jacobianCenterOfMass(self._model, self._data, self.q, False).copy()
+        J: Array = pin.jacobianCenterOfMass(self._model, self._data, self.q, False)
         centre: Array = self._data.com[0].copy()
         return centre, J
 

@@ -32,9 +32,9 @@ class SelectiveDamping:
     J = sum_i sigma_i u_i v_i^T (m, nv) and V (m,) are the primary task's, in the task frame; v in
     rad/s. x^(k) is the share of the k-th end effector, here of the k-th task of first priority
     (the source's have three rows each, and a pose counts as one). No joint is faster than
-    gamma_max and a nearly lost direction is hardly moved, without any damping elsewhere; the soft
-    one is off course everywhere, and jumps to half where the sum reaches gamma_max. Knows no
-    limits; weights play no part.
+    gamma_max and a nearly lost direction is hardly moved, unless its joints have no other use,
+    without any damping elsewhere; the soft one is off course everywhere, and jumps to half where
+    the sum reaches gamma_max. Knows no limits; weights play no part.
 
     Attributes:
         max_rate: gamma_max [rad/s]. The source limits displacements, to pi/4 in an iteration; as
@@ -63,7 +63,8 @@ class SelectiveDamping:
         starts = [0, *rows][:-1]
         N, reach = _lengths(U, starts), _lengths(task.J, starts)
         size = np.abs(Vt)
-        gamma = np.minimum(1.0, N * sigma / size.dot(reach)) * self.max_rate
+        # N_i <= M_i by the triangle inequality: min(1, N_i/M_i) needs no minimum.
+        gamma = N * sigma / size.dot(reach) * self.max_rate
         response = task.V.dot(U) / sigma
         largest = np.abs(response) * size.max(axis=1)
         if self.clamp == "soft":

@@ -275,6 +275,16 @@ def test_manipulability_half_way_halves_the_damping() -> None:
     np.testing.assert_allclose(v, J[0] * 2 / (1 + 0.25**2), rtol=1e-14)
 
 
+def test_numerical_filtering_damps_one_direction_and_beta_the_second() -> None:
+    """Two directions lost, J = diag(1, s, 0): 1/s down to the rank tolerance, 0 from there."""
+    V = np.ones(3)
+    for s, expected in ((1e-3, 1e3), (2e-6, 5e5), (5e-7, 0.0), (0.0, 0.0)):
+        v = answer("dls-variable", np.diag([1.0, s, 0.0]), V)
+        np.testing.assert_allclose(v, [1, expected, 0], rtol=1e-9)
+    v = answer("dls-variable[isotropic_damping=0.01]", np.diag([1.0, 1e-3, 0.0]), V)
+    np.testing.assert_allclose(v, [1 / (1 + 1e-4), 1e-3 / (1e-6 + 1e-4), 0], rtol=1e-9)
+
+
 # --- parameters
 
 

@@ -69,6 +69,13 @@ def test_elbow_at_a_right_angle_by_hand() -> None:
     np.testing.assert_allclose(answer("sdls[clamp=soft]", (SQUARE, 100 * lost)), soft, rtol=1e-12)
 
 
+def test_a_joint_of_no_reach_is_moved_all_the_same() -> None:
+    """J = diag(1, eps): M_2 = 1 whatever eps is, so joint 2 runs at gamma_max, until it is lost."""
+    for eps, speed in ((1e-3, 2.0), (1e-9, 2.0), (1e-11, 0.0)):
+        v = answer("sdls", (np.diag([1.0, eps]), np.array([0.0, 1.0])))
+        np.testing.assert_allclose(v, [0, speed], rtol=1e-9)
+
+
 def definition(tasks: list[tuple[Array, Array]], most: float, clamp: str) -> Array:
     """The law as it is published, loop by loop; every task is an end effector."""
     J = np.vstack([task[0] for task in tasks])
