@@ -41,13 +41,13 @@ def reach(
     acceleration: bool = False,
     seed: int = 0,
 ) -> Scenario:
-    """A step to a target nearby: the easy case that every law must pass.
+    """A step to a target nearby: the easy case.
 
     The target is `distance` [m] and `angle` [rad] away from the start, along the body axis
     (-1, 1, -1)/sqrt(3) and about it; for a planar arm, along (-1, 1)/sqrt(2) and clockwise. A seed
     turns the axis, and moves the start by up to 0.1 rad per joint.
 
-    Provokes: nothing; every law must pass
+    Provokes: nothing; who fails here fails everywhere
 
     Shows in: position_error_final_m, orientation_error_final_rad
 
