@@ -16,7 +16,7 @@ from dikbench.references import target_at_rest
 from dikbench.robot_catalogue import load_robot
 from dikbench.scenario import Scenario
 from dikbench.status import STEP_CODE, Status
-from dikbench.tasks import PoseTask
+from dikbench.tasks import PoseTask, PositionTask
 from dikbench.trace import Trace
 
 # --- metrics of a motion made by hand
@@ -28,10 +28,11 @@ from dikbench.trace import Trace
 J = np.array([[0.4, 0.0, 0.0], [0.5, 0.5, 0.2], [1.0, 1.0, 1.0]])
 STEP = J[:, 0]
 RADIUS = math.sqrt(0.41)
+ELBOW = 0.4 / RADIUS  # the end of the first link, at 0.4 m, is the second task's
 
 
 def _scenario() -> Scenario:
-    """Hold the tip where it is at q_1 = 0; limits of 0.05 rad, 1.5 rad/s and 20 rad/s^2."""
+    """Hold tip and elbow where they are at q_1 = 0; limits of 0.05 rad, 1.5 rad/s, 20 rad/s^2."""
     robot = load_robot("planar3r").with_limits(
         position=([-0.25, -2, -2], [0.05, 2, 2]), velocity=(-1.5, 4.0), acceleration=20.0
     )
@@ -45,6 +46,7 @@ def _scenario() -> Scenario:
         dt=0.1,
         duration=0.4,
         certificate=Certificate(()),
+        tasks=(PositionTask(target=np.array([0.4, 0.0, 0.0]), frame="link1", priority=2),),
     )
 
 
@@ -107,6 +109,9 @@ def _rms(*values: float) -> float:
         ("orientation_error_rms_rad", _rms(0, 0.1, 0.1, 0.2, 0.2)),
         ("orientation_error_max_rad", 0.2),
         ("orientation_error_final_rad", 0.2),
+        ("second_task_error_rms", _rms(0, *(ELBOW * _chord(a) for a in (0.1, 0.1, 0.2, 0.2)))),
+        ("second_task_error_final", ELBOW * _chord(0.2)),
+        ("path_length_m", 2 * _chord(0.1) + _chord(0.2)),
         ("off_course_max_rad", math.pi),
         ("progress_mean", (1.0 - 2.0 + 0.5 + 0.0) / 4),
         ("progress_min", -2.0),
@@ -237,7 +242,7 @@ def test_no_step_leaves_what_it_cannot_define() -> None:
     assert list(got) == list(METRICS)
     for name, value in got.items():
         defined = "error" in name or name in {
-            "joint_travel_rad", "sigma_min", "position_violation_max_rad"
+            "joint_travel_rad", "sigma_min", "position_violation_max_rad", "path_length_m"
         }  # fmt: skip
         assert math.isnan(value) != defined, name
     assert got["position_error_max_m"] == pytest.approx(0.0, abs=1e-12)

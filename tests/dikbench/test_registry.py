@@ -123,7 +123,7 @@ def test_wrong_formulations_name_what_would_be_valid(text: str, parts: list[str]
         ("near-mis", ["unknown scenario 'near-mis'", "did you mean 'near-miss'?", "speed-sweep"]),
         ("near-miss[mis=1]", ["parameter of scenario near-miss 'mis'", "did you mean 'miss'?"]),
         ("near-miss[miss=far]", ["near-miss: miss='far' is not valid"]),
-        ("near-miss[robot=iiwa]", ["robot='iiwa' is not valid", "valid: ur5, ur10, panda"]),
+        ("near-miss[robot=iiwa]", ["unknown robot 'iiwa'", "panda", "or give the path of a .urdf"]),
         ("reach[robot=pnada]", ["unknown robot 'pnada'", "did you mean 'panda'?"]),
         ("reach[seed=3]", ["the seed is not a parameter"]),
         ("reach[dt=0]", ["scenario reach: dt=0.0 must be positive and finite"]),

@@ -96,7 +96,8 @@ def test_every_planned_trial_has_its_row(results: Path) -> None:
     trials = pd.read_csv(results / "trials.csv")
     keys = ["formulation", "solver", "scenario", "plant", "reference", "seed"]
     assert not trials.duplicated(keys).any()
-    assert len(trials) == 9 * 2 * 2 * 2 * 2
+    oracles = 2 * 2  # scenarios and seeds: one plant, one reference mode
+    assert len(trials) == 9 * 2 * 2 * 2 * 2 + oracles
     assert {*keys, "status", *METRICS, "law_time_median_us", "law_time_p99_us"} <= {*trials.columns}
 
 
@@ -104,7 +105,9 @@ def test_cells_that_cannot_work_are_rows_that_say_why(results: Path) -> None:
     """An LP through proxqp, and a path-indexed run without a path, are skipped with a reason."""
     trials = pd.read_csv(results / "trials.csv")
     skipped = trials[trials["status"] == "skipped"]
-    no_path = skipped[skipped["solver"] != "proxqp"]
+    oracle = skipped["formulation"] == "oracle"
+    assert skipped[oracle]["message"].str.contains("no joint motion").all()
+    no_path = skipped[(skipped["solver"] != "proxqp") & ~oracle]
     assert (no_path["scenario"] == "reach").all()
     assert (no_path["reference"] == "path").all()
     assert skipped["message"].str.len().gt(10).all()
@@ -114,7 +117,8 @@ def test_cells_that_cannot_work_are_rows_that_say_why(results: Path) -> None:
 def test_times_are_of_the_law_and_not_of_a_trial(results: Path) -> None:
     """Times belong to formulation, solver and scenario; solving is part of the law's time."""
     trials = pd.read_csv(results / "trials.csv")
-    ran = trials[(trials["status"] == "ok") & (trials["seed"] == 0)]
+    law = trials["formulation"] != "oracle"
+    ran = trials[law & (trials["status"] == "ok") & (trials["seed"] == 0)]
     per_cell = ran.groupby(["formulation", "solver", "scenario"])["law_time_median_us"]
     assert per_cell.nunique().eq(1).all()
     inside = ran["solver_core_time_median_us"] + ran["solver_wrapper_time_median_us"]
