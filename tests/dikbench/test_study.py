@@ -51,11 +51,11 @@ def test_every_shipped_study_expands_to_trials_with_distinct_ids(name: str) -> N
 
 
 def test_quick_covers_laws_families_and_solvers() -> None:
-    """The default study has the five formulations, the four families and six QP solvers."""
+    """The default study has five laws, the oracle, four families and six QP solvers."""
     trials = [planned.trial for planned in expand(load_study("quick"))]
     laws = {trial.formulation.partition("[")[0] for trial in trials}
     families = {trial.scenario.partition("[")[0] for trial in trials}
-    assert laws == {"pinv", "dls", "nullspace", "qp", "lp-alpha", "lp-alpha-cvxpy"}
+    assert laws == {"oracle", "pinv", "dls", "nullspace", "qp", "lp-alpha", "lp-alpha-cvxpy"}
     assert families == {"reach", "near-miss", "joint-limit-crossing", "speed-sweep"}
     solvers = [parse_solver(trial.solver) for trial in trials if trial.formulation == "qp"]
     assert len({solver.name for solver in solvers}) == 6
