@@ -81,7 +81,8 @@ def _saturated(
         if scale > best_scale:
             best, best_scale = _inside(b + scale * a, box), scale
         if optimal and scale >= 0:
-            wrong = _wrong_side(b + scale * a, held.effect, inverse @ level.J, box, bounds)
+            moved = b + scale * a - start  # by this level, which makes it as small as it can
+            wrong = _wrong_side(moved, held.effect, inverse @ level.J, box, bounds)
             for joint in wrong:
                 del bounds[joint]
             if wrong:
