@@ -104,7 +104,7 @@ def test_the_square_wave_is_as_asked() -> None:
     """Origin, then back and turned, then again; weights are costs squared."""
     scenario = make_scenario("log-derivative-drift")
     assert scenario.duration == pytest.approx(8.0)
-    for time, there in ((0.0, 0), (1.99, 0), (2.0, 1), (3.99, 1), (4.0, 0), (6.0, 1), (7.9, 1)):
+    for time, there in ((0.0, 0), (1.99, 0), (2.0, 1), (3.99, 1), (4.0, 0), (6.0, 1), (8.0, 1)):
         X = scenario.reference.placement(time)
         assert X.translation == pytest.approx([-0.2 * there, 0, 0])
         yaw = np.arctan2(X.rotation[1, 0], X.rotation[0, 0])
@@ -118,10 +118,46 @@ def test_a_drift_without_a_turn_does_not_certify(monkeypatch: pytest.MonkeyPatch
     """Blunted: nothing to swing out for."""
     module = sys.modules["scenarios.log_derivative_drift"]
     monkeypatch.setattr(module, "between", lambda *given: None)
+    with pytest.raises(DikbenchError, match="length of the screw over the distance"):
+        make_scenario("log-derivative-drift[turn=0.6]")
     with pytest.raises(DikbenchError, match="yaw between the poses"):
-        make_scenario("log-derivative-drift[turn=0.1]")
+        make_scenario("log-derivative-drift[turn=3.1]")
+    # 0.88 m without and 0.83 m with it, where qp adds 1e-6 to P: nothing to be seen any more.
     with pytest.raises(DikbenchError, match="weight of the orientation"):
-        make_scenario("log-derivative-drift[orientation_cost=1]")
+        make_scenario("log-derivative-drift[orientation_cost=0.003]")
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, 3])
+def test_with_the_derivative_the_base_goes_straight_and_arrives(
+    metrics: Metrics, seed: int
+) -> None:
+    """The ideal 0.600 m from every seed, which starts at its first pose, and no error at the end.
+
+    The error at the end is the one to the last pose, not to the one that would come next.
+    """
+    scenario = make_scenario("log-derivative-drift", seed)
+    found = metrics("qp[damping=0.001,log_derivative=true]", scenario)
+    assert found["path_length_m"] == pytest.approx(0.6, rel=0.01)
+    assert found["position_error_final_m"] < 1e-3
+    assert metrics("qp[damping=0.001]", scenario)["path_length_m"] > 2.0
+
+
+def test_a_base_that_does_not_turn_spirals_in(metrics: Metrics) -> None:
+    """Damping far above the weight: the drift is a product in the complex plane.
+
+    p the base as seen from a target at an angle theta: a step of gain g takes it to
+    (1 - g (a + i b)) p with a = theta/2 cot(theta/2), b = theta/2; where theta is 0, straight on.
+    """
+    half = 0.45 * pi
+    spiral = 0.05 * complex(half / np.tan(half), half)
+    p, length = 0j, 0.0  # the base; the targets are 0 and -0.2
+    for target, rate in ((0.0, 0.05), (-0.2, spiral), (0.0, 0.05), (-0.2, spiral)):
+        for _ in range(200):
+            step = -rate * (p - target)
+            p, length = p + step, length + abs(step)
+    scenario = make_scenario("log-derivative-drift[orientation_cost=1e-6]")
+    found = metrics("qp[damping=0.001]", scenario)
+    assert found["path_length_m"] == pytest.approx(length, rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -129,7 +165,7 @@ def test_a_drift_without_a_turn_does_not_certify(monkeypatch: pytest.MonkeyPatch
     [
         ("task-conflict[robot=ur5]", "planar4r, planar3r, panda"),
         ("task-conflict[speed=2]", "speed=2.0 must be between 0.05 and 0.9"),
-        ("log-derivative-drift[turn=3.2]", "turn=3.2 must be between -3.0 and 3.0"),
+        ("log-derivative-drift[turn=3.2]", "turn=3.2 must be between 2.0 and 3.0"),
         ("log-derivative-drift[robot=panda]", "base"),
     ],
 )
