@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.array import Array
+from dikbench.kinematics import Kinematics
 from dikbench.robot import Robot
 
 
@@ -58,16 +59,15 @@ def joint_path(
     duration: float,
 ) -> Reference:
     """The motion of the task frame along a joint motion: tau -> q (nq,), tau -> dq/dtau (nv,)."""
-    model, frame = robot.model, robot.frame_id
-    data = model.createData()
+    kinematics = Kinematics(robot)
 
     def placement(tau: float) -> Any:
-        pin.forwardKinematics(model, data, configuration(tau))
-        return pin.updateFramePlacement(model, data, frame).copy()
+        kinematics.update(configuration(tau))
+        return kinematics.placement(robot.frame_id).copy()
 
     def twist(tau: float) -> Array:
-        J = pin.computeFrameJacobian(model, data, configuration(tau), frame, pin.LOCAL)
-        V: Array = J @ velocity(tau)
+        kinematics.update(configuration(tau))
+        V: Array = kinematics.jacobian(robot.frame_id) @ velocity(tau)
         return V
 
     return Reference(duration, placement, twist)
