@@ -8,6 +8,7 @@ import pinocchio as pin
 from dikbench.array import Array
 from dikbench.errors import DikbenchError
 from dikbench.kinematics import Kinematics
+from dikbench.linear_algebra import pseudo_inverse
 from dikbench.oracle import POSE, oracle_motion
 from dikbench.references import Reference
 from dikbench.robot import Robot
@@ -97,6 +98,20 @@ def duration_at(robot: Robot, at_one_second: Reference, q0: Array, speed: float)
     """
     motion = oracle_motion(robot, at_one_second, q0, np.linspace(0.0, 1.0, 201))
     return motion.peak_speed_ratio / speed
+
+
+def least_norm_share(robot: Robot, q: Array, joint: int, tracking: TrackingTask = POSE) -> float:
+    """The smallest share of a joint in the least-norm velocity that does what it does alone.
+
+    The entry (joint, joint) of J^+ J, at configurations q (k, nq): 1 where no other velocity does
+    it, less where the arm's null space has a part of it.
+    """
+    kinematics, rows, shares = Kinematics(robot), np.array(tracking.rows(robot)), []
+    for sample in q:
+        kinematics.update(sample)
+        J = kinematics.jacobian(robot.frame_id)[rows]
+        shares.append(pseudo_inverse(J, 1e-6)[joint] @ J[:, joint])
+    return float(min(shares))
 
 
 def samples(duration: float, dt: float, most: int = 200) -> Array:

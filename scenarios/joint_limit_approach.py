@@ -42,8 +42,9 @@ def joint_limit_approach(
     """A joint that is driven towards its limit, and beyond, at a share of its velocity limit.
 
     The joint moves at a constant rate v = speed v_max, from 1.25 braking distances v^2/(2 a) (and
-    at least 0.3 rad) before its upper limit to `depth` beyond it, all others stand still, and the
-    task frame is asked to follow. Acceleration limits of a [rad/s^2] are in force on every joint.
+    at least 0.3 rad) before its upper limit to `depth` beyond it, or further, for as long as who
+    brakes in time takes to stop; all others stand still, and the task frame is asked to follow.
+    Acceleration limits of a [rad/s^2] are in force on every joint.
     Who looks one step ahead brakes too late: in the end the position or the acceleration limit
     gives way. A seed moves the other joints by up to 0.1 rad and changes the rate by up to 5 %.
 
@@ -56,7 +57,7 @@ def joint_limit_approach(
         joint: pan (the first) or wrist_3 (the last).
         deceleration: a [rad/s^2], 2 to 50.
         speed: of the joint over its limit, 0.1 to 0.95.
-        depth: how far beyond the limit the path goes [rad], 0.02 to 0.5.
+        depth: how far beyond the limit the path goes at least [rad], 0.02 to 0.5.
         gain: of the tracking task, 1/s.
         dt: control period [s].
         seed: 0 perturbs nothing.
@@ -75,21 +76,25 @@ def joint_limit_approach(
     rate = speed / change.pace * velocity.upper[j]
     braking = rate**2 / (2 * deceleration)
     start = change.posture(arm, np.array(POSTURE), (j,)).copy()
-    start[j] = position.upper[j] - max(ROOM * braking, 0.3)
+    room = max(ROOM * braking, 0.3)
+    start[j] = position.upper[j] - room
     out = np.zeros(arm.nv)
     out[j] = rate
-    duration = float((position.upper[j] + depth - start[j]) / rate)
+    stopped = (room - braking) / rate + rate / deceleration  # at full rate, then braking
+    duration = float(max((room + depth) / rate, 1.05 * stopped))
 
     def q_r(tau: float) -> Array:
         q: Array = pin.integrate(arm.model, start, tau * out)
         return q
 
     motion = joint_oracle(arm, q_r, samples(duration, dt))
-    room = float(position.upper[j] - motion.q[0][j])
+    before = float(position.upper[j] - motion.q[0][j])
     certificate = Certificate(
         (
-            Claim("room before the limit over the braking distance", room / braking, 1.0),
-            Claim("deepest margin of the motion [rad]", motion.margin.min(), at_most=-0.8 * depth),
+            Claim("room before the limit over the braking distance", before / braking, 1.0),
+            # Less than half a turn beyond it, or the shortest way to the target is another one.
+            Claim("deepest margin of the motion [rad]", motion.margin.min(), -3.0, -0.8 * depth),
+            Claim("duration over the time to stop", duration / stopped, at_least=1.0),
             Claim("smallest singular value (m, rad)", motion.sigma_min.min(), at_least=0.03),
             Claim("required speed over limit", motion.peak_speed_ratio, 0.9 * speed, 0.999),
         )

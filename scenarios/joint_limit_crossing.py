@@ -20,7 +20,14 @@ from dikbench.robot_catalogue import load_robot
 from dikbench.scenario import Scenario
 from dikbench.tasks import PoseTask
 from dikbench.variation import Variation
-from scenarios.common import between, limits_in_force, positive, samples, secondary_tasks
+from scenarios.common import (
+    between,
+    least_norm_share,
+    limits_in_force,
+    positive,
+    samples,
+    secondary_tasks,
+)
 
 VARIATION = Variation(start=0.1)
 
@@ -44,7 +51,7 @@ CROSSINGS: Mapping[str, Crossing] = MappingProxyType(
         "ur3": Crossing((0.0, -1.2, 1.4, -1.7, -1.4, 0.2), 0),
         "ur10": Crossing((0.0, -1.2, 1.4, -1.7, -1.4, 0.2), 3),
         "xarm7": Crossing((0.0, -0.5, 0.0, 1.0, 0.0, 1.3, 0.0), 3),
-        "tiago": Crossing((1.4, -0.4, -1.2, 1.5, 0.0, -0.5, 0.4), 4),
+        "tiago": Crossing((1.4, -0.4, -1.2, 1.5, 0.0, -0.5, 0.4), 3),
         "talos": Crossing((-0.4, 0.9, 0.6, -1.5, 0.5, 0.5, -0.1), 5),
         "lwr": Crossing((0.0, 0.8, 0.8, 0.8, 0.8, 0.8, 0.0), 3),
         "planar3r": Crossing((0.3, 1.6, 0.6), 2),
@@ -71,9 +78,9 @@ def joint_limit_crossing(
     One joint j moves as q_j(t) = q_max,j - approach + (approach + depth) sin^2(pi t/T), the others
     stand still, and the task frame is asked to follow: the target is out of reach, by this posture,
     while q_j is beyond its limit. UR3 and UR5 cross with their base, the UR10 with joint 4, the
-    Panda and Talos with joint 6, TIAGo with joint 5, xArm7 and LWR with their elbow, the planar arm
-    with its last joint.
-    A seed moves the other joints by up to 0.1 rad.
+    Panda and Talos with joint 6, TIAGo, xArm7 and LWR with their elbow, the planar arm with its
+    last joint: most of their least-norm motion is this joint's, too, so that no null space spares
+    it. A seed moves the other joints by up to 0.1 rad.
 
     Provokes: a path that leads out of a joint's range
 
@@ -124,6 +131,7 @@ def joint_limit_crossing(
             Claim("position margin at the start [rad]", motion.margin[0], 0.9 * approach),
             Claim("deepest margin of the motion [rad]", motion.margin.min(), at_most=-0.8 * depth),
             Claim("smallest singular value (m, rad)", motion.sigma_min.min(), at_least=0.03),
+            Claim("its share in the least-norm motion", least_norm_share(arm, motion.q, j), 0.8),
             Claim("required speed over limit", motion.speed_ratio.max(), 0.8 * speed, 1.05 * speed),
         )
     )

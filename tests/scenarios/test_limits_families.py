@@ -12,10 +12,41 @@ import pytest
 
 from dikbench.errors import DikbenchError
 from dikbench.kinematics import Kinematics
-from dikbench.registry import make_scenario
+from dikbench.metrics import evaluate
+from dikbench.motion import recompute
+from dikbench.registry import make_plant, make_scenario
+from dikbench.replay import replay_of
+from dikbench.robot_catalogue import load_robot
+from dikbench.simulation import simulate
+from dikbench.solvers.checked import make_solve
+from scenarios.joint_limit_crossing import CROSSINGS, Crossing
 from scenarios.start_outside import JOINTS
 
 Metrics = Callable[..., dict[str, float]]
+
+# --- crossing
+
+
+@pytest.mark.parametrize("robot", CROSSINGS)
+def test_laws_without_limits_cross_and_those_with_them_do_not(metrics: Metrics, robot: str) -> None:
+    """The pseudo-inverse goes as deep as the path, clipped or scaled too; the program stays."""
+    scenario = make_scenario(f"joint-limit-crossing[robot={robot}]")
+    for law in ("pinv", "pinv[after=clip]", "pinv[after=scale]"):
+        assert metrics(law, scenario)["position_violation_max_rad"] > 0.19
+    assert metrics("qp", scenario)["position_violation_max_rad"] < 1e-4
+
+
+@pytest.mark.parametrize(("robot", "joint"), [("tiago", 4), ("panda", 0)])
+def test_a_joint_that_the_null_space_spares_does_not_certify(
+    monkeypatch: pytest.MonkeyPatch, robot: str, joint: int
+) -> None:
+    """TIAGo's joint 5 and the Panda's base: most of their motion is left to the others."""
+    module = sys.modules["scenarios.joint_limit_crossing"]
+    spared = Crossing(tuple(load_robot(robot).q0), joint)
+    monkeypatch.setattr(module, "CROSSINGS", {robot: spared})
+    with pytest.raises(DikbenchError, match="its share in the least-norm motion"):
+        make_scenario(f"joint-limit-crossing[robot={robot}]")
+
 
 # --- approach at speed
 
@@ -26,7 +57,10 @@ Metrics = Callable[..., dict[str, float]]
 def test_an_approach_leaves_room_to_brake_and_no_more(
     robot: str, joint: str, deceleration: float
 ) -> None:
-    """1.25 braking distances v^2/(2 a), at 0.9 of the joint's speed, to `depth` beyond."""
+    """1.25 braking distances v^2/(2 a), at 0.9 of the joint's speed, to `depth` beyond or more.
+
+    It lasts until a joint that keeps its speed for as long as it can, and then brakes, has stopped.
+    """
     scenario = make_scenario(
         f"joint-limit-approach[robot={robot},joint={joint},deceleration={deceleration}]"
     )
@@ -45,22 +79,31 @@ def test_an_approach_leaves_room_to_brake_and_no_more(
     braking = scenario.v0[j] ** 2 / (2 * deceleration)
     assert room == pytest.approx(max(1.25 * braking, 0.3))
     end = scenario.q0 + scenario.duration * scenario.v0
-    assert end[j] == pytest.approx(position.upper[j] + 0.2)
+    assert 0.2 - 1e-9 < end[j] - position.upper[j] < 3.0
+    stopping = (room - braking) / scenario.v0[j] + scenario.v0[j] / deceleration
+    assert scenario.duration > stopping
     assert np.count_nonzero(scenario.v0) == 1
 
 
-@pytest.mark.parametrize("deceleration", [2.0, 20.0])
+@pytest.mark.parametrize("deceleration", [2.0, 5.0, 20.0])
 def test_looking_one_step_ahead_brakes_too_late(metrics: Metrics, deceleration: float) -> None:
-    """`one-step` gives the acceleration limit up, `viable` keeps both, `pinv` runs through."""
+    """`one-step` gives the acceleration limit up, `viable` keeps both, `pinv` runs through.
+
+    `sqrt` stops, but its box is empty on most of the steps, and it brakes up to twice as hard.
+    """
     scenario = make_scenario(f"joint-limit-approach[deceleration={deceleration}]")
-    hasty, viable, blind = (
-        metrics(law, scenario) for law in ("qp[braking=one-step]", "qp[braking=viable]", "pinv")
+    hasty, viable, sqrt, blind = (
+        metrics(law, scenario)
+        for law in ("qp[braking=one-step]", "qp", "lp-alpha[braking=sqrt]", "pinv")
     )
+    assert sqrt["position_violation_max_rad"] < 1e-6
+    assert 0.3 < sqrt["acceleration_violation_max_rad_s2"] / deceleration < 1.0
+    assert 0.6 < sqrt["relaxed_share"] < 0.9
     assert hasty["position_violation_max_rad"] < 1e-6
     assert hasty["acceleration_violation_max_rad_s2"] > 5 * deceleration
     assert viable["position_violation_max_rad"] < 1e-6
     assert viable["acceleration_violation_max_rad_s2"] < 1e-3
-    assert blind["position_violation_max_rad"] == pytest.approx(0.2, abs=0.02)
+    assert blind["position_violation_max_rad"] > 0.18
 
 
 def test_an_approach_without_room_or_without_limit_does_not_certify(
@@ -160,7 +203,18 @@ def test_the_shortest_way_leads_through_the_limit() -> None:
     assert scenario.motion is not None
     assert scenario.motion.q[-1] == pytest.approx([5.5])
     assert scenario.motion.margin.min() == pytest.approx(0.5)
-    assert scenario.motion.peak_speed_ratio == pytest.approx(0.5)
+    assert scenario.motion.peak_speed_ratio == pytest.approx(0.8, rel=1e-3)
+
+
+def test_the_way_round_keeps_every_limit() -> None:
+    """The oracle, acceleration limits in force: 5 rad, nothing violated, no error at the end."""
+    scenario = make_scenario("greedy-trap[acceleration=true]")
+    run = simulate(scenario, replay_of(scenario), make_solve(None, None), make_plant("ideal"))
+    found = evaluate(recompute(run.trace, scenario))
+    assert found["joint_travel_rad"] == pytest.approx(5.0, abs=1e-3)
+    assert found["orientation_error_final_rad"] < 1e-3
+    for kind in ("position_violation_max_rad", "acceleration_violation_max_rad_s2"):
+        assert found[kind] == 0.0
 
 
 @pytest.mark.parametrize("law", ["qp", "lp-alpha", "drake", "hqp", "pink-qp"])
