@@ -10,6 +10,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from dikbench.constraints import Constraint, TorqueConstraint
     from dikbench.errors import DikbenchError, Infeasible, SolverFailed
     from dikbench.one_step import DikAnswer, solve_dik
     from dikbench.problem import DikProblem, Formulation, Solve
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "CentreOfMassTask": "tasks",
+    "Constraint": "constraints",
     "DampingTask": "tasks",
     "DikAnswer": "one_step",
     "DikProblem": "problem",
@@ -45,12 +47,14 @@ _HOME = {
     "SolverFailed": "errors",
     "Status": "status",
     "Task": "tasks",
+    "TorqueConstraint": "constraints",
     "load_robot": "robot_catalogue",
     "solve_dik": "one_step",
 }
 
 __all__ = [
     "CentreOfMassTask",
+    "Constraint",
     "DampingTask",
     "DikAnswer",
     "DikProblem",
@@ -67,6 +71,7 @@ __all__ = [
     "SolverFailed",
     "Status",
     "Task",
+    "TorqueConstraint",
     "load_robot",
     "solve_dik",
 ]

@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.array import Array
+from dikbench.box import velocity_box
 from dikbench.kinematics import Kinematics
 from dikbench.problem import DikProblem
 from dikbench.robot import Robot
@@ -54,7 +55,7 @@ def states() -> Iterator[State]:
     """Every state, built afresh: a law that spoils its inputs spoils one state.
 
     Places (inside, about a limit, singular) are crossed with three speeds; acceleration limits, the
-    motion before and a posture task come in turns.
+    motion before, a posture task and rows G v <= h come in turns.
     """
     for seed, name in enumerate(SINGULAR):
         known = load_robot(name)
@@ -69,8 +70,12 @@ def states() -> Iterator[State]:
                     robot = robot.with_limits(acceleration=known.available_acceleration)
                 problem = _problem(robot, q, _twist(robot, random, speed), posture=posture)
                 problem.v_prev = _velocity_before(problem, before, random)
+                rows = count % 4 == 3
+                if rows:
+                    problem.G, problem.h = _rows(problem, np.random.default_rng([seed, count]))
                 label = f"{name}, state {count} ({place}, {speed:g} m/s, v_prev {before}"
                 label += ", acceleration limits" if acceleration else ""
+                label += ", G v <= h" if rows else ""
                 label += ", posture task)" if posture else ")"
                 yield State(label, problem)
                 count += 1
@@ -119,6 +124,15 @@ def _velocity_before(problem: DikProblem, before: str, random: np.random.Generat
     v = np.linalg.pinv(task.J, rcond=1e-6) @ task.V
     v /= max(1.0, 2 * float(np.max(np.abs(v) / fastest)))
     return v + 0.5 * DT * spread * robot.available_acceleration
+
+
+def _rows(problem: DikProblem, random: np.random.Generator) -> tuple[Array, Array]:
+    """Half-spaces that cut the velocity box, their normals of unit length; some of it is left."""
+    box = velocity_box(problem.limits, problem.v_prev, problem.dt)
+    inside = np.clip(np.zeros(problem.robot.nv), box.lower, box.upper)
+    G = random.normal(size=(3, problem.robot.nv))
+    G /= np.linalg.norm(G, axis=1, keepdims=True)
+    return G, G @ inside + random.uniform(0, 0.3, 3)
 
 
 def _problem(robot: Robot, q: Array, twist: Array, *, posture: bool) -> DikProblem:

@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.array import Array
+from dikbench.constraints import Constraint, linearize_all
 from dikbench.control_step import TrialEnded, control_step
 from dikbench.errors import DikbenchError, unknown
 from dikbench.kinematics import Kinematics
@@ -58,6 +59,7 @@ def solve_dik(
     solver: str | None = None,
     v_prev: object = None,
     tasks: Sequence[Task] = (),
+    constraints: Sequence[Constraint] = (),
 ) -> DikAnswer:
     """Compute the joint velocity of one control step.
 
@@ -77,6 +79,7 @@ def solve_dik(
             law written in cvxpy. Not used by laws that need none.
         v_prev: velocity applied in the step before, (nv,); None means no acceleration bound.
         tasks: secondary tasks.
+        constraints: what must hold beside the limits of the joints.
 
     Raises:
         DikbenchError: on a wrong name, shape or value, or a law that raises, or answers with a
@@ -115,6 +118,7 @@ def solve_dik(
         sorted([main, *(task.linearize(kinematics) for task in tasks)], key=lambda t: t.priority),
         robot.limits.at(configuration),
     )
+    problem.G, problem.h = linearize_all(constraints, kinematics, previous, dt)
     solve = _solve_for(law, solver)
     try:
         outcome = control_step(law, problem, solve)

@@ -14,7 +14,7 @@ from dikbench.quadratic_program import Program, QuadraticProgram
 from dikbench.robot import Robot
 from dikbench.tasks.task import LinearizedTask, stacked
 
-LimitKind = Literal["position", "velocity", "acceleration"]
+LimitKind = Literal["position", "velocity", "acceleration", "inequalities"]
 
 
 class DikProblem(msgspec.Struct, eq=False):
@@ -28,6 +28,8 @@ class DikProblem(msgspec.Struct, eq=False):
         tasks: the linearised tasks J v = V, most important first.
         limits: the limits in force, as seen from q.
         relaxed: joints whose acceleration bound `box` had to give up (a record, see `box`).
+        G, h: what else must hold, G v <= h, (p, nv) and (p,); None where nothing else must (see
+            `dikbench.constraints`).
     """
 
     robot: Robot
@@ -37,6 +39,8 @@ class DikProblem(msgspec.Struct, eq=False):
     tasks: list[LinearizedTask]
     limits: Limits
     relaxed: int = 0
+    G: Array | None = None
+    h: Array | None = None
 
     @property
     def primary(self) -> LinearizedTask:

@@ -51,6 +51,14 @@ class Robot:
         return frame_id(self.model, self.frame)
 
     @cached_property
+    def available_effort(self) -> Array:
+        """The model's effort limits, (nv,) [N m or N], infinite where it has none.
+
+        In force only where a scenario or `with_limits(effort=...)` says so.
+        """
+        return _symmetric(self.model.effortLimit).upper
+
+    @cached_property
     def scratch(self) -> Any:
         """A `pinocchio.Data` of its own for laws that need more than the task Jacobian."""
         return self.model.createData()

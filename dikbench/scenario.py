@@ -11,6 +11,7 @@ import pinocchio as pin
 
 from dikbench.array import Array
 from dikbench.certificate import Certificate
+from dikbench.constraints import Constraint
 from dikbench.oracle import OracleMotion, follow
 from dikbench.references import Reference
 from dikbench.robot import Robot
@@ -37,6 +38,7 @@ class Scenario:
         motion: the joint motion from which the path was built, on which the certificate was
             measured, from q0 on; None where no joint motion follows the reference.
         variation: what a seed perturbs.
+        constraints: what must hold beside the limits of the joints.
     """
 
     robot: Robot
@@ -50,6 +52,7 @@ class Scenario:
     tasks: tuple[Task, ...] = ()
     motion: OracleMotion | None = None
     variation: Variation = NO_VARIATION
+    constraints: tuple[Constraint, ...] = ()
 
     def __post_init__(self) -> None:
         """Check that a run ends (see `steps_in`)."""

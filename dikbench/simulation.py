@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.array import Array
+from dikbench.constraints import linearize_all
 from dikbench.control_step import TrialEnded, control_step
 from dikbench.kinematics import Kinematics
 from dikbench.plants import Plant
@@ -136,6 +137,7 @@ def simulate(
         The trace and how the run ended; failures of the law are statuses, never exceptions.
     """
     robot, dt, secondaries = scenario.robot, scenario.dt, scenario.tasks
+    constraints = scenario.constraints
     model, limits_at, integrate, ok = robot.model, robot.limits.at, pin.integrate, Status.OK
     steps = scenario.steps * (LONGEST if mode == "path" else 1)
     targets = scenario.targets if mode == "time" else None
@@ -170,6 +172,8 @@ def simulate(
                 tasks.append(more)
             limits = limits_at(seen)
             problem = DikProblem(robot, seen, v_prev, dt, tasks, limits)
+            if constraints:
+                problem.G, problem.h = linearize_all(constraints, kinematics, v_prev, dt)
             kinematics_ns += perf_counter_ns() - start
             record.wanted.append(task.V)
             record.task_jacobian.append(task.J)

@@ -7,7 +7,7 @@
 or, without pytest, `check_formulation(MyLaw())`. A check that fails raises `AssertionError` with
 the robot, the state and what was violated. The states are the same in every run: three arms inside,
 at and outside their limits and at exact singularities, asked for no, an ordinary and a huge twist,
-with and without a posture task, acceleration limits and a motion before.
+with and without a posture task, acceleration limits, rows G v <= h and a motion before.
 """
 
 from __future__ import annotations
@@ -159,6 +159,8 @@ def _inputs(problem: DikProblem) -> dict[str, Array | float]:
         "limits.to_lower": problem.limits.to_lower,
         "limits.to_upper": problem.limits.to_upper,
         "robot.q0": problem.robot.q0,
+        "G": problem.G,
+        "h": problem.h,
     }
     for number, task in enumerate(problem.tasks):
         for name in ("J", "V", "error", "weight", "priority"):
@@ -215,6 +217,11 @@ def check_acceleration_limits(formulation: Formulation, solver: str | None = Non
     _check_promise("acceleration", formulation, solver)
 
 
+def check_inequalities(formulation: Formulation, solver: str | None = None) -> None:
+    """Where promised: G v <= h, at states where the law has an answer."""
+    _check_promise("inequalities", formulation, solver)
+
+
 def _check_promise(kind: LimitKind, formulation: Formulation, solver: str | None) -> None:
     if kind in promises_of(formulation):
         for state, v, tolerance in _Asked(formulation, solver).verified():
@@ -238,6 +245,9 @@ def _allowed(problem: DikProblem, kind: LimitKind) -> tuple[Array, Array] | None
 
 
 def _assert_within(state: State, kind: LimitKind, v: Array, tolerance: float) -> None:
+    if kind == "inequalities":
+        _assert_inequalities(state, v, tolerance)
+        return
     allowed = _allowed(state.problem, kind)
     if allowed is None:
         return
@@ -248,6 +258,18 @@ def _assert_within(state: State, kind: LimitKind, v: Array, tolerance: float) ->
         raise AssertionError(
             f"{state.label}: joint {worst} passes its {kind} limit: {v[worst]:.9g} rad/s, allowed "
             f"from {lower[worst]:.9g} to {upper[worst]:.9g}"
+        )
+
+
+def _assert_inequalities(state: State, v: Array, tolerance: float) -> None:
+    G, h = state.problem.G, state.problem.h
+    if G is None or h is None:
+        return
+    excess = G @ v - h
+    worst = int(np.argmax(excess))
+    if excess[worst] > tolerance:
+        raise AssertionError(
+            f"{state.label}: row {worst} of G v <= h is passed by {excess[worst]:.9g} rad/s"
         )
 
 
@@ -278,6 +300,7 @@ CHECKS: Final[tuple[Check, ...]] = (
     check_position_limits,
     check_velocity_limits,
     check_acceleration_limits,
+    check_inequalities,
 )
 """Every check: (formulation, solver's selector or None for the default) -> None."""
 

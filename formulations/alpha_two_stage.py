@@ -15,6 +15,7 @@ from dikbench.problem import DikProblem, LimitKind, Solve
 from dikbench.quadratic_program import Program, QuadraticProgram
 from dikbench.tasks.task import LinearizedJointTask
 from formulations.lp_alpha import alpha_program
+from formulations.null_space_program import limits_about
 
 
 @dataclass(frozen=True)
@@ -26,8 +27,9 @@ class AlphaTwoStage:
 
     J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s; N (nv, nv - rank J)
     an orthonormal basis of the null space of J; v_2 = gain e the wanted velocity of the problem's
-    posture task, zero where there is none. lo and hi are the velocity box. Stage 2 moves in the
-    null space only: posed with J v = alpha* V as an equality, solvers find it infeasible by
+    posture task, zero where there is none. lo and hi are the velocity box; both stages keep
+    G v <= h as well, where the scenario bounds torques and distances. Stage 2 moves in the null
+    space only: posed with J v = alpha* V as an equality, solvers find it infeasible by
     rounding. What Drake's single weighted cost approximates. Never off course and inside every
     limit; weights play no part.
 
@@ -42,7 +44,9 @@ class AlphaTwoStage:
     braking: Braking = "viable"
 
     program: ClassVar[Program] = "lp"
-    keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
+    keeps: ClassVar[frozenset[LimitKind]] = frozenset(
+        {"position", "velocity", "acceleration", "inequalities"}
+    )
 
     def __post_init__(self) -> None:
         """Check the parameters."""
@@ -53,18 +57,14 @@ class AlphaTwoStage:
         """See `Formulation`."""
         task, box = problem.primary, problem.box(self.braking)
         n = problem.robot.nv
-        first = solve(alpha_program(task, box, 0.0))[:n]
+        first = solve(alpha_program(task, box, 0.0, problem.G, problem.h))[:n]
         N = null_space(task.J, self.rank_tolerance)
         k = N.shape[1]
         if not k:
             return first
         wanted = posture_velocity(problem)
-        # The first stage keeps the box to a solver's tolerance only: z = 0 stays feasible.
-        lower, upper = np.minimum(box.lower, first), np.maximum(box.upper, first)
-        G = np.vstack([N, -N])
-        h = np.concatenate([upper - first, first - lower])
-        bounded = np.isfinite(h)
-        z = solve(QuadraticProgram(np.eye(k), N.T @ (first - wanted), G=G[bounded], h=h[bounded]))
+        G, h = limits_about(first, N, box, problem)
+        z = solve(QuadraticProgram(np.eye(k), N.T @ (first - wanted), G, h))
         v: Array = first + N @ z
         return v
 

@@ -13,6 +13,7 @@ from dikbench.errors import DikbenchError
 from dikbench.linear_algebra import null_space
 from dikbench.problem import DikProblem, LimitKind, Solve
 from dikbench.quadratic_program import Program, QuadraticProgram
+from formulations.null_space_program import limits_about
 
 UNIQUE = 1e-5
 """Damping of the levels above the last: solvers are exact on strictly convex programs, and a task
@@ -24,7 +25,8 @@ class HierarchicalQp:
     """Strict priorities inside the limits: a quadratic program per priority level.
 
         level k:  min_(v, w_k)  1/2 ||w_k||^2
-                  s.t.  J_k v = V_k + w_k,   J_j v = V_j + w_j* for j < k,   lo <= v <= hi
+                  s.t.  J_k v = V_k + w_k,   J_j v = V_j + w_j* for j < k,   lo <= v <= hi,
+                        G v <= h   (torques and distances, where the scenario bounds them)
 
     over the priority levels k = 1, ..., K; J_k (m_k, nv) and V_k (m_k,) are level k's rows
     multiplied by the square roots of their weights, poses in the task frame; v in rad/s; lo and hi
@@ -47,7 +49,9 @@ class HierarchicalQp:
     braking: Braking = "viable"
 
     program: ClassVar[Program] = "qp"
-    keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
+    keeps: ClassVar[frozenset[LimitKind]] = frozenset(
+        {"position", "velocity", "acceleration", "inequalities"}
+    )
 
     def __post_init__(self) -> None:
         """Check the parameters."""
@@ -66,22 +70,23 @@ class HierarchicalQp:
             A = scale[:, None] * level.J @ N
             last = number == len(levels) - 1
             damping = self.damping if last else UNIQUE
-            z = solve(_level(A, scale * (level.V - level.J @ v), v, N, box, damping))
+            z = solve(_level(A, scale * (level.V - level.J @ v), v, N, box, damping, problem))
             v = v + N @ z
             if not last:
-                N = N @ null_space(A, self.rank_tolerance)
+                free = null_space(A, self.rank_tolerance)
+                if free.shape[1] < N.shape[1]:
+                    N = N @ free
         return v
 
 
-def _level(A: Array, r: Array, v: Array, N: Array, box: Box, damping: float) -> QuadraticProgram:
-    """Min 1/2 ||A z - r||^2 + 1/2 damping^2 ||v + N z||^2 s.t. the box on v + N z, in z."""
+def _level(
+    A: Array, r: Array, v: Array, N: Array, box: Box, damping: float, problem: DikProblem
+) -> QuadraticProgram:
+    """Min 1/2 ||A z - r||^2 + 1/2 damping^2 ||v + N z||^2 s.t. the limits on v + N z, in z."""
     k = N.shape[1]
     P = A.T @ A + damping**2 * np.eye(k)  # N is orthonormal
     q = -A.T @ r + damping**2 * (N.T @ v)
-    # What the level before reached, to a solver's tolerance, stays feasible: z = 0.
-    lower, upper = np.minimum(box.lower - v, 0.0), np.maximum(box.upper - v, 0.0)
-    if k == len(v):
-        return QuadraticProgram(P, q, lb=lower, ub=upper)
-    h = np.concatenate([upper, -lower])
-    bounded = np.isfinite(h)
-    return QuadraticProgram(P, q, G=np.vstack([N, -N])[bounded], h=h[bounded])
+    if k == len(v):  # nothing above has taken anything: N = I
+        h = None if problem.G is None or problem.h is None else problem.h - problem.G @ v
+        return QuadraticProgram(P, q, problem.G, h, lb=box.lower - v, ub=box.upper - v)
+    return QuadraticProgram(P, q, *limits_about(v, N, box, problem))

@@ -20,7 +20,8 @@ class LpAlpha:
     """Alpha scaling: go in the wanted direction, as fast as the limits allow.
 
         max_(v, alpha)  alpha - 1/2 rho ||v||^2
-        s.t.            J v = alpha V,   0 <= alpha <= 1,   lo <= v <= hi   (the velocity box)
+        s.t.            J v = alpha V,   0 <= alpha <= 1,   lo <= v <= hi   (the velocity box),
+                        G v <= h   (torques and distances, where the scenario bounds them)
 
     J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s. A linear program
     where rho = 0; its vertices are not unique where the arm has a null space and v then chatters,
@@ -39,7 +40,9 @@ class LpAlpha:
     braking: Braking = "viable"
 
     program: ClassVar[Program] = "lp"
-    keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
+    keeps: ClassVar[frozenset[LimitKind]] = frozenset(
+        {"position", "velocity", "acceleration", "inequalities"}
+    )
 
     def __post_init__(self) -> None:
         """Check the parameters."""
@@ -50,7 +53,7 @@ class LpAlpha:
         """See `Formulation`."""
         task = problem.primary
         rho = regularization_for(task, self.regularization)
-        x = solve(alpha_program(task, problem.box(self.braking), rho))
+        x = solve(alpha_program(task, problem.box(self.braking), rho, problem.G, problem.h))
         return x[: problem.robot.nv]
 
 
@@ -62,7 +65,13 @@ def regularization_for(task: LinearizedTask, given: float | None) -> float:
     return 1e-4 if n > m else 0.0
 
 
-def alpha_program(task: LinearizedTask, box: Box, regularization: float) -> QuadraticProgram:
+def alpha_program(
+    task: LinearizedTask,
+    box: Box,
+    regularization: float,
+    G: Array | None = None,
+    h: Array | None = None,
+) -> QuadraticProgram:
     """The program of `LpAlpha` in matrices, in x = (v, alpha), shape (nv + 1,)."""
     m, n = task.J.shape
     P = np.zeros((n + 1, n + 1))
@@ -74,4 +83,5 @@ def alpha_program(task: LinearizedTask, box: Box, regularization: float) -> Quad
     A[:, n] = -task.V
     lower, upper = np.zeros(n + 1), np.ones(n + 1)
     lower[:n], upper[:n] = box.lower, box.upper
-    return QuadraticProgram(P, q, A=A, b=np.zeros(m), lb=lower, ub=upper)
+    rows = None if G is None else np.pad(G, ((0, 0), (0, 1)))
+    return QuadraticProgram(P, q, rows, h, A, np.zeros(m), lower, upper)

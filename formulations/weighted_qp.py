@@ -21,6 +21,7 @@ class WeightedQp:
 
         min_v  sum_i 1/2 ||J_i v - V_i||^2_(W_i) + 1/2 lambda^2 ||v||^2
         s.t.   lo <= v <= hi   (the velocity box: position, velocity and acceleration limits)
+               G v <= h        (torques and distances, where the scenario bounds them)
 
     over all tasks i, with W_i the task's weights (priorities play no part); poses in the task
     frame; v in rad/s. With no bound active, one task and W = I it is damped least squares.
@@ -43,7 +44,9 @@ class WeightedQp:
     log_derivative: bool = False
 
     program: ClassVar[Program] = "qp"
-    keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
+    keeps: ClassVar[frozenset[LimitKind]] = frozenset(
+        {"position", "velocity", "acceleration", "inequalities"}
+    )
 
     def __post_init__(self) -> None:
         """Check the parameters."""
@@ -62,4 +65,4 @@ class WeightedQp:
             P = P + square
             wanted = wanted + pull
         box = problem.box(self.braking, self.position_gain)
-        return solve(QuadraticProgram(P, -wanted, lb=box.lower, ub=box.upper))
+        return solve(QuadraticProgram(P, -wanted, problem.G, problem.h, lb=box.lower, ub=box.upper))

@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 
 from dikbench.array import Array
+from dikbench.constraints import linearize_all
 from dikbench.control_step import TrialEnded, control_step
 from dikbench.kinematics import Kinematics
 from dikbench.plants import Plant
@@ -151,6 +152,7 @@ def _time_kinematics(scenario: Scenario, segment: Sequence[DikProblem]) -> Array
         for secondary in scenario.tasks:
             tasks.append(secondary.linearize(kinematics))
         DikProblem(robot, given.q, given.v_prev, given.dt, tasks, robot.limits.at(given.q))
+        linearize_all(scenario.constraints, kinematics, given.v_prev, given.dt)
         found.append(perf_counter_ns() - start)
     return np.array(found, dtype=float)
 

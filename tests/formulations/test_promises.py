@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from dikbench import LinearizedTask, PostureTask, load_robot
 from dikbench.array import Array
+from dikbench.box import velocity_box
 from dikbench.contract_states import SINGULAR, State
 from dikbench.kinematics import Kinematics
 from dikbench.problem import DikProblem, Formulation, LimitKind, Solve, program_of
@@ -99,7 +100,24 @@ def states(draw: st.DrawFn) -> State:
         tasks.append(PostureTask(robot.q0, gain=1 / dt).linearize(kinematics))
     label = f"{name}, {place}, limits {kinds}, |V| <= {size:g}, before {before}, dt {dt}"
     label += f", posture {posture}, q {q.tolist()}, v_prev {v_prev}, V {V.tolist()}"
-    return State(label, DikProblem(robot, q, v_prev, dt, tasks, robot.limits.at(q)))
+    problem = DikProblem(robot, q, v_prev, dt, tasks, robot.limits.at(q))
+    if draw(st.booleans()):
+        problem.G, problem.h = draw(_half_spaces(problem))
+        label += f", G {problem.G.tolist()}, h {problem.h.tolist()}"
+    return State(label, problem)
+
+
+@st.composite
+def _half_spaces(draw: st.DrawFn, problem: DikProblem) -> tuple[Any, Any]:
+    """Rows of unit length, some of zeros, about the nearest velocity to rest in the box."""
+    n = problem.robot.nv
+    box = velocity_box(problem.limits, problem.v_prev, problem.dt)
+    inside = np.clip(np.zeros(n), box.lower, box.upper)
+    G = np.array(draw(_vector(2 * n, st.sampled_from([0.0, 1.0, -1.0, 0.3])))).reshape(2, n)
+    length = np.linalg.norm(G, axis=1, keepdims=True)
+    G = np.divide(G, length, out=G, where=length > 0)
+    room = draw(st.sampled_from([0.0, 1e-6, 0.1, 10.0]))
+    return G, G @ inside + room
 
 
 def _vector(n: int, elements: st.SearchStrategy[float]) -> st.SearchStrategy[list[float]]:
