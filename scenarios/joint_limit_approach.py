@@ -50,7 +50,7 @@ def joint_limit_approach(
 
     Provokes: braking before a position limit with little deceleration
 
-    Shows in: position_violation_max_rad, acceleration_violation_max_rad_s2, infeasible_share
+    Shows in: position_violation_max_rad, acceleration_violation_max_rad_s2, relaxed_share
 
     Args:
         robot: ur5, ur3 or ur10.

@@ -17,18 +17,37 @@ from dikbench.robot_catalogue import load_robot
 from dikbench.scenario import Scenario
 from dikbench.tasks import PoseTask
 from dikbench.variation import Variation
-from scenarios.common import between, limits_in_force, positive, samples, secondary_tasks
+from scenarios.common import (
+    between,
+    least_norm_share,
+    limits_in_force,
+    positive,
+    samples,
+    secondary_tasks,
+)
 
 JOINTS: Mapping[str, int] = MappingProxyType(
-    {"ur5": 5, "ur3": 5, "ur10": 5, "panda": 5, "xarm7": 3, "tiago": 4, "talos": 5, "planar3r": 2}
+    {
+        "ur5": 5,
+        "ur3": 5,
+        "ur10": 5,
+        "panda": 5,
+        "xarm7": 3,
+        "kinova": 4,
+        "tiago": 6,
+        "talos": 5,
+        "planar3r": 2,
+    }
 )
-"""The joint (index into v) that is outside its upper limit."""
+"""The joint (index into v) that is outside its upper limit: no null space brings it back."""
 
 VARIATION = Variation(start=0.05, timing=0.1)
 
 
 def start_outside(
-    robot: Literal["ur5", "ur3", "ur10", "panda", "xarm7", "tiago", "talos", "planar3r"] = "ur5",
+    robot: Literal[
+        "ur5", "ur3", "ur10", "panda", "xarm7", "kinova", "tiago", "talos", "planar3r"
+    ] = "ur5",
     *,
     outside: float = 5e-3,
     rate: float = 0.05,
@@ -51,7 +70,7 @@ def start_outside(
     Shows in: infeasible_share, position_violation_max_rad, velocity_peak_ratio
 
     Args:
-        robot: ur5, ur3, ur10, panda, xarm7, tiago, talos or planar3r.
+        robot: ur5, ur3, ur10, panda, xarm7, kinova, tiago, talos or planar3r.
         outside: distance of the start from the limit [rad], 1e-4 to 1e-2.
         rate: of the joint on the way inside [rad/s], 0 to 0.5.
         gain: of the tracking task, 1/s.
@@ -69,7 +88,7 @@ def start_outside(
     change, j = VARIATION.drawn(seed), JOINTS[robot]
     assert arm.limits.position is not None
     start = change.posture(arm, arm.q0, (j,)).copy()
-    start[j] = arm.limits.position.upper[j] + outside
+    start[arm.limits.q_index[j]] = arm.limits.position.upper[j] + outside
     inward = np.zeros(arm.nv)
     inward[j] = -rate / change.pace
 
@@ -84,6 +103,7 @@ def start_outside(
         (
             Claim("margin at the start [rad]", motion.margin[0], -1.001e-2, -0.99e-4),
             Claim("way towards the inside [rad]", inside, 0.99 * min(travel, 0.1), travel + 1e-9),
+            Claim("its share in the least-norm motion", least_norm_share(arm, motion.q, j), 0.8),
             Claim("smallest singular value (m, rad)", motion.sigma_min.min(), at_least=0.03),
             Claim("required speed over limit", motion.peak_speed_ratio, at_most=0.9),
         )

@@ -14,7 +14,7 @@ import pinocchio as pin
 from dikbench.array import Array
 from dikbench.certificate import Certificate, Claim
 from dikbench.kinematics import Kinematics
-from dikbench.linear_algebra import null_space
+from dikbench.linear_algebra import damped_least_squares, null_space
 from dikbench.oracle import joint_oracle
 from dikbench.references import joint_path
 from dikbench.robot import Robot
@@ -64,6 +64,9 @@ CONFLICTS: Mapping[str, Conflict] = MappingProxyType(
 )
 
 VARIATION = Variation(start=0.05, timing=0.1)
+
+SELF_MOTION = 50
+"""Steps towards the elbow's target that the arm makes about a hand at rest."""
 
 
 def task_conflict(
@@ -132,7 +135,7 @@ def task_conflict(
         (
             Claim("smallest singular value of J_2 N_1 half way (m)", free, at_most=1e-3),
             Claim("smallest singular value of J_2 itself (m)", alone, at_least=0.01),
-            Claim("error of the elbow, the hand on its way [m]", apart, at_least=0.02),
+            Claim("least error of the elbow, the hand on its way [m]", apart, at_least=0.02),
             Claim("smallest singular value of the hand's task", motion.sigma_min.min(), 0.02),
             Claim("position margin [rad]", motion.margin.min(), at_least=0.05),
             Claim("required speed over limit", motion.peak_speed_ratio, 0.8 * speed, 1.2 * speed),
@@ -156,13 +159,26 @@ def task_conflict(
 def _conflict(
     arm: Robot, q: Array, tracking: TrackingTask, second: PositionTask
 ) -> tuple[float, float, float]:
-    """At q: the last of rank J_2 singular values of J_2 N_1 and of J_2; the elbow's error."""
+    """At q: the last of rank J_2 singular values of J_2 N_1 and of J_2; the elbow's error.
+
+    That is the least one to which the arm gets from q while the hand stays where it is.
+    """
     kinematics = Kinematics(arm)
     kinematics.update(q)
-    first = tracking.linearize(kinematics, kinematics.placement(arm.frame_id).copy())
+    hand = kinematics.placement(arm.frame_id).copy()
+    first = tracking.linearize(kinematics, hand)
     task = second.linearize(kinematics)
     singular = np.linalg.svd(task.J, compute_uv=False)
     rank = int(np.count_nonzero(singular > 1e-3))
     left = np.linalg.svd(task.J @ null_space(first.J, 1e-6), compute_uv=False)
     free = float(left[rank - 1]) if len(left) >= rank else 0.0
-    return free, float(singular[rank - 1]), float(np.linalg.norm(task.error))
+    apart = float(np.linalg.norm(task.error))
+    for _ in range(SELF_MOTION):
+        back = np.linalg.pinv(first.J, rcond=1e-6) @ first.error
+        N = null_space(first.J, 1e-6)
+        pull = task.error - task.J @ back
+        q = pin.integrate(arm.model, q, back + N @ damped_least_squares(task.J @ N, pull, 0.05))
+        kinematics.update(q)
+        first, task = tracking.linearize(kinematics, hand), second.linearize(kinematics)
+        apart = min(apart, float(np.linalg.norm(task.error)))
+    return free, float(singular[rank - 1]), apart
