@@ -159,7 +159,7 @@ def test_one_joint_starts_outside_and_the_path_leads_inside(robot: str, outside:
     assert np.delete(seen.to_upper, j).min() > 0.05
     assert seen.to_lower.min() > 0.05
     inside = scenario.q0.copy()
-    inside[j] -= 0.1
+    inside[arm.limits.q_index[j]] -= 0.1
     kinematics = Kinematics(arm)
     kinematics.update(inside)
     X = kinematics.placement(arm.frame_id)
