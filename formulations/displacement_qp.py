@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import ClassVar
+
 import numpy as np
 
 from dikbench.array import Array
 from dikbench.errors import DikbenchError
 from dikbench.linear_algebra import scaled_identity
-from dikbench.problem import DikProblem
-from dikbench.quadratic_program import QuadraticProgram
+from dikbench.problem import DikProblem, LimitKind, Solve
+from dikbench.quadratic_program import Program, QuadraticProgram
 
 
-def displacement_program(
-    problem: DikProblem, *, damping: float, lm_damping: float, position_gain: float
-) -> QuadraticProgram:
+@dataclass(frozen=True)
+class DisplacementQp:
     """The program of a law that is posed in displacements Delta q = v dt, divided by dt^2.
 
         min_v  sum_i 1/2 ||Jl_i (J_i v - V_i)||^2_(W_i) + 1/2 (lambda^2 + mu_i) ||v||^2
@@ -22,47 +24,52 @@ def displacement_program(
     with Jl_i the derivative of the task's logarithm and mu_i = lm_damping dt^2 ||V_i||^2_(W_i): P
     is theirs, q is theirs over dt, and so is h. With acceleration limits in force also
     v_prev + a_min dt <= v <= v_prev + a_max dt and v <= sqrt(2 a d) at a distance d from a limit.
+    All tasks count with their weights, priorities do not.
 
-    Args:
-        problem: the control step; all its tasks count with their weights, priorities do not.
+    Attributes:
         damping: lambda, unsquared.
         lm_damping: factor of the damping by the squared error, of every pose task.
         position_gain: share of the distance to a position limit per step.
     """
-    n = problem.robot.nv
-    P = scaled_identity(n, damping**2)
-    q = np.zeros(n)
-    for task in problem.tasks:
-        H, g = task.normal_equations(log_derivative=True)
-        P = P + H
-        q -= g
-        if lm_damping and task.log_derivative is not None:
-            mu = lm_damping * problem.dt**2 * float((task.weight * task.V) @ task.V)
-            P = P + mu * scaled_identity(n, 1.0)
-    box = problem.box("gain", position_gain)
-    lower, upper = box.lower, box.upper
-    acceleration, limits = problem.limits.joint.acceleration, problem.limits
-    if acceleration is not None and limits.to_lower is not None and limits.to_upper is not None:
-        lower = np.maximum(lower, -_braking(acceleration.upper, limits.to_lower))
-        upper = np.minimum(upper, _braking(-acceleration.lower, limits.to_upper))
-    return QuadraticProgram(P, q, lb=lower, ub=upper)
+
+    damping: float = 1e-6
+    lm_damping: float = 0.0
+    position_gain: float = 0.5
+
+    _law: ClassVar[str]
+    program: ClassVar[Program] = "qp"
+    keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        for name in ("damping", "lm_damping"):
+            if not 0 <= getattr(self, name) < np.inf:
+                raise DikbenchError(f"{self._law}: {name} must be finite and at least 0")
+        if not 0 < self.position_gain <= 1:
+            raise DikbenchError(f"{self._law}: position_gain must be above 0 and at most 1")
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        n = problem.robot.nv
+        P = scaled_identity(n, self.damping**2)
+        q = np.zeros(n)
+        for task in problem.tasks:
+            H, g = task.normal_equations(log_derivative=True)
+            P = P + H
+            q -= g
+            if self.lm_damping and task.log_derivative is not None:
+                mu = self.lm_damping * problem.dt**2 * float((task.weight * task.V) @ task.V)
+                P = P + mu * scaled_identity(n, 1.0)
+        box = problem.box("gain", self.position_gain)
+        lower, upper = box.lower, box.upper
+        acceleration, limits = problem.limits.joint.acceleration, problem.limits
+        if acceleration is not None and limits.to_lower is not None and limits.to_upper is not None:
+            lower = np.maximum(lower, -_braking(acceleration.upper, limits.to_lower))
+            upper = np.minimum(upper, _braking(-acceleration.lower, limits.to_upper))
+        return solve(QuadraticProgram(P, q, lb=lower, ub=upper))
 
 
 def _braking(deceleration: Array, distance: Array) -> Array:
     """sqrt(2 a d), (nv,) [rad/s]; no bound outside a limit, where the box asks for the way back."""
     speed = np.sqrt(2 * deceleration * np.maximum(distance, 0.0))
     return np.where(distance < 0, np.inf, speed)
-
-
-def check_gains(law: str, *, damping: float, lm_damping: float, position_gain: float) -> None:
-    """Check the parameters of a law of this kind.
-
-    Raises:
-        DikbenchError: on the first that is out of range.
-    """
-    if not 0 <= damping < np.inf:
-        raise DikbenchError(f"{law}: damping must be finite and at least 0")
-    if not 0 <= lm_damping < np.inf:
-        raise DikbenchError(f"{law}: lm_damping must be finite and at least 0")
-    if not 0 < position_gain <= 1:
-        raise DikbenchError(f"{law}: position_gain must be above 0 and at most 1")

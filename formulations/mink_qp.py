@@ -5,14 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from dikbench.array import Array
-from dikbench.problem import DikProblem, LimitKind, Solve
-from dikbench.quadratic_program import Program
-from formulations.displacement_qp import check_gains, displacement_program
+from formulations.displacement_qp import DisplacementQp
 
 
 @dataclass(frozen=True)
-class MinkQp:
+class MinkQp(DisplacementQp):
     """The quadratic program as mink poses it: all tasks at once, with the logarithm's derivative.
 
         min_v  sum_i 1/2 ||Jl_i (J_i v - V_i)||^2_(W_i) + 1/2 (lambda^2 + mu_i) ||v||^2
@@ -33,29 +30,6 @@ class MinkQp:
     for the identity below a rotation of 1e-5 rad) this law does not.
     """
 
-    damping: float = 1e-6
-    lm_damping: float = 0.0
     position_gain: float = 0.95
 
-    program: ClassVar[Program] = "qp"
-    keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        check_gains(
-            "mink-qp",
-            damping=self.damping,
-            lm_damping=self.lm_damping,
-            position_gain=self.position_gain,
-        )
-
-    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
-        """See `Formulation`."""
-        return solve(
-            displacement_program(
-                problem,
-                damping=self.damping,
-                lm_damping=self.lm_damping,
-                position_gain=self.position_gain,
-            )
-        )
+    _law: ClassVar[str] = "mink-qp"
