@@ -128,7 +128,8 @@ def _samples(reference: Reference, end: float, dt: float) -> tuple[Array, Array]
     """Times (f,) [s] and points (f, 3) [m] whose connection is within `CHORD` of the path."""
 
     def at(times: Array) -> Array:
-        return np.array([reference.placement(float(tau)).translation for tau in times])
+        points = [reference.placement(tau).translation for tau in times.tolist()]
+        return np.array(points).reshape(-1, 3)
 
     times = np.linspace(0.0, end, max(2, int(np.ceil(end / dt))) + 1)
     points = at(times)
