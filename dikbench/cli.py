@@ -218,6 +218,34 @@ def time(study: str | None, out: Path | None, **axes: Any) -> None:
 
 @commands.command()
 @click.argument("folder", type=click.Path(path_type=Path, file_okay=False))
+@click.option(
+    "--jobs",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Worker processes; default: one per core.",
+)
+@one_line_errors
+def recompute(folder: Path, jobs: int | None) -> None:
+    """Compute all metrics of a results folder anew from its traces, without running a law.
+
+    For metrics that are new, or were mended, since the run. Trials whose trace was not kept stay as
+    they are; the tables and figures are made anew by the next `dikbench run`.
+    """
+    from dikbench.run.recompute import recompute_results
+    from dikbench.run.runner import Interrupted
+    from dikbench.run.workers import available_cores
+
+    command = shlex.join(["dikbench", *sys.argv[1:]])
+    try:
+        done = recompute_results(folder, jobs or available_cores(), command)
+    except Interrupted as stopped:
+        click.echo(f"\nstopped: {stopped}; to continue: {command}", err=True)
+        sys.exit(130)
+    click.echo(f"{done}; {folder / 'trials.csv'}")
+
+
+@commands.command()
+@click.argument("folder", type=click.Path(path_type=Path, file_okay=False))
 @one_line_errors
 def status(folder: Path) -> None:
     """Count the trials of a results folder: done, failed by status, missing."""

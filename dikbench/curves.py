@@ -119,4 +119,4 @@ def _curve(
         twist: Array = rate * (world @ rotation(angle)).ravel()
         return twist
 
-    return Reference(laps * period, placement, velocity)
+    return Reference(laps * period, placement, velocity, period=period)

@@ -186,5 +186,6 @@ def _metric(name: str) -> str:
             f"{name}: {metric.definition}",
             f"  unit: {metric.unit or 'none'}; best {metric.best}; worst value {metric.worst}",
             f"  table: {metric.table}",
+            f"  source: {metric.source.strip('[]')}",
         ]
     )

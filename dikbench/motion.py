@@ -10,7 +10,10 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.array import Array
+from dikbench.following import follow_path
 from dikbench.kinematics import Kinematics
+from dikbench.limits import Interval
+from dikbench.progress import progress, row_weights
 from dikbench.scenario import Scenario
 from dikbench.tasks import PostureTask
 from dikbench.trace import Trace
@@ -51,6 +54,74 @@ class Motion:
         return twists
 
     @cached_property
+    def progress(self) -> Array:
+        """Share of the wanted motion that each step made, but for dwells, (k,) (see `progress`)."""
+        weights = row_weights(self.scenario.rows)
+        alpha = progress(self.trace.wanted, self.achieved, weights)
+        return alpha[~np.isnan(alpha)]
+
+    @cached_property
+    def velocities(self) -> Array:
+        """Joint velocity at the start and in each step, (n + 1, nv) [rad/s]."""
+        return np.vstack([self.scenario.v0, self.trace.applied])
+
+    @cached_property
+    def accelerations(self) -> Array:
+        """Joint acceleration into each step, (n, nv) [rad/s^2]."""
+        a: Array = np.diff(self.velocities, axis=0) / self.trace.dt
+        return a
+
+    @cached_property
+    def position_excess(self) -> Array:
+        """How far the joint that is farthest is outside its position limits, (n + 1,) [rad or m].
+
+        At the start and after each step; 0 inside, and where no limits are in force.
+        """
+        limits = self.scenario.robot.limits
+        return _worst_excess(self.trace.q[:, limits.q_index], limits.position)
+
+    @cached_property
+    def velocity_excess(self) -> Array:
+        """Likewise of the velocity limits, in each step, (n,) [rad/s or m/s]."""
+        return _worst_excess(self.trace.applied, self.scenario.robot.limits.velocity)
+
+    @cached_property
+    def acceleration_excess(self) -> Array:
+        """Likewise of the acceleration limits, into each step, (n,) [rad/s^2 or m/s^2]."""
+        return _worst_excess(self.accelerations, self.scenario.robot.limits.acceleration)
+
+    @cached_property
+    def contour_error(self) -> Array:
+        """Distance of the task frame from the path of the reference, (n + 1,) [m].
+
+        The nearest point of the whole path counts, whenever the reference is there; of a target
+        that has no path, the target. NaN where the task is about the orientation only.
+        """
+        path = self.scenario.path
+        if path is None or np.isnan(self.position_error[0]):
+            return self.position_error
+        return path.distances(self.translations)
+
+    @cached_property
+    def lag(self) -> Array:
+        """Delay along the path, (n + 1,) [s].
+
+        The nominal time that the reference takes on its way from the nearest point of the path (see
+        `follow_path`) to the target, without dwells, in which nothing is to be caught up; and, as a
+        path-indexed target waits, by how much it is late itself: trace time - tau, 0 where the
+        reference moves on with the clock. NaN where the task is about the orientation only, or
+        there is no way to go.
+        """
+        path, tau = self.scenario.path, self.trace.tau
+        if path is None or path.is_point or np.isnan(self.position_error[0]):
+            return np.full(len(tau), np.nan)
+        along = follow_path(path, self.translations, np.interp(tau, path.times, path.arcs))
+        target = np.interp(tau, path.times, path.moving_times)
+        way = target - np.interp(along, path.arcs, path.moving_times)
+        lag: Array = np.maximum(way, 0.0) + (self.trace.dt * np.arange(len(tau)) - tau)
+        return lag
+
+    @cached_property
     def second_task_error(self) -> Array:
         """Norm of the error of the second tasks, (n + 1,) [their units]; empty where there is none.
 
@@ -70,6 +141,15 @@ class Motion:
     def sigma_min(self) -> float:
         """Smallest singular value of the task Jacobian (m, rad) on the way."""
         return _smallest_singular_value(self.jacobians)
+
+
+def _worst_excess(values: Array, interval: Interval | None) -> Array:
+    """How far the joint that is farthest lies outside an interval, of values (k, nv), (k,)."""
+    if interval is None:
+        return np.zeros(len(values))
+    outside: Array = np.maximum(values - interval.upper, interval.lower - values)
+    worst: Array = outside.max(axis=1, initial=0.0)
+    return worst
 
 
 def _smallest_singular_value(J: Array) -> float:

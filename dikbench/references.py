@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -26,12 +27,17 @@ class Reference:
         placement: tau -> placement X_d in the world (`pinocchio.SE3`).
         velocity: tau -> body twist V_d at nominal speed, (6,) [m/s; rad/s], in the axes of X_d.
         moving: whether there is a path at all.
+        period: nominal time of a lap, after which everything comes again [s]; infinite where
+            nothing does.
+        first_lap: nominal time at which the first lap begins [s].
     """
 
     duration: float
     placement: Callable[[float], Any]
     velocity: Callable[[float], Array]
     moving: bool = True
+    period: float = math.inf
+    first_lap: float = 0.0
 
 
 def target_at_rest(target: Any, duration: float) -> Reference:

@@ -13,6 +13,7 @@ from dikbench.array import Array
 from dikbench.certificate import Certificate
 from dikbench.constraints import Constraint
 from dikbench.oracle import OracleMotion, follow
+from dikbench.path import Path, path_of
 from dikbench.references import Reference
 from dikbench.robot import Robot
 from dikbench.steps import steps_in
@@ -85,6 +86,13 @@ class Scenario:
         """Rotations (n + 1, 3, 3) and translations (n + 1, 3) of `targets`."""
         rotations = np.array([X.rotation for X, _ in self.targets])
         return rotations, np.array([X.translation for X, _ in self.targets])
+
+    @cached_property
+    def path(self) -> Path | None:
+        """The path of the reference, as far as any run goes; None for a target at rest."""
+        if not self.reference.moving:
+            return None
+        return path_of(self.reference, max(self.reference.duration, self.steps * self.dt), self.dt)
 
     @cached_property
     def oracle(self) -> Array | None:

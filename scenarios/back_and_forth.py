@@ -172,4 +172,4 @@ def _path(where: SetUp, yaw: float, pace: float) -> Reference:
         twist: Array = rate * (world @ inclined @ target).ravel()
         return twist
 
-    return Reference(pace * DURATION, placement, velocity)
+    return Reference(pace * DURATION, placement, velocity, period=pace * pi)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 from types import MappingProxyType
 from typing import Literal
@@ -140,6 +140,7 @@ def _path(arm: Robot, q0: Array, centre: Array, speed: float, laps: int) -> Refe
     points = np.vstack([start.translation, corners])
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     times = np.concatenate([[0.0], np.cumsum(lengths) / speed])
-    return through(
+    path = through(
         times.tolist(), [pin.SE3(start.rotation, point) for point in points], smooth=False
     )
+    return replace(path, period=6 * RADIUS / speed, first_lap=float(times[1]))

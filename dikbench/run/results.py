@@ -65,15 +65,26 @@ class ResultsFolder:
             raise DikbenchError(f"output folder {self.path} cannot be locked: {reason}") from None
         return lock
 
-    def open_store(self) -> Store:
+    def check_there(self) -> None:
+        """Check that there are results.
+
+        Raises:
+            DikbenchError: if there are none.
+        """
+        if not self.database.is_file():
+            raise DikbenchError(f"no results in {self.path}: {self.database.name} is missing")
+
+    def open_store(self, *, add_metrics: bool = False) -> Store:
         """The store that is there already.
+
+        Args:
+            add_metrics: see `Store`.
 
         Raises:
             DikbenchError: if there is none, or it cannot be read.
         """
-        if not self.database.is_file():
-            raise DikbenchError(f"no results in {self.path}: {self.database.name} is missing")
-        return Store(self.database)
+        self.check_there()
+        return Store(self.database, add_metrics=add_metrics)
 
     def export(self, store: Store) -> None:
         """Write the trials as CSV and Parquet, the times as CSV, and the manifest.

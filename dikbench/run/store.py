@@ -7,6 +7,7 @@ import json
 import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Self
 
@@ -51,10 +52,31 @@ and shown after it. It is `superseded`, kept but not shown, where the plan has a
 selectors whose law or scenario has another source."""
 
 
-class Store:
-    """An open store; one process writes, committing every row, others may read."""
+@dataclass(frozen=True)
+class StoredTrial:
+    """What identifies a row.
 
-    def __init__(self, path: Path) -> None:
+    Attributes:
+        id: see `trial_id`.
+        trial: the cell.
+        steps: number of control steps that it made.
+    """
+
+    id: str
+    trial: Trial
+    steps: int
+
+
+class Store:
+    """An open store; one process writes, committing every row, others may read.
+
+    Args:
+        path: its file.
+        add_metrics: whether a store that lacks metrics gets their columns, empty, instead of being
+            refused.
+    """
+
+    def __init__(self, path: Path, *, add_metrics: bool = False) -> None:
         self.path = path
         with self._guarded():
             self._database = sqlite3.connect(path, isolation_level=None)
@@ -62,7 +84,7 @@ class Store:
             self._database.execute("PRAGMA journal_mode = WAL")
             self._database.execute("PRAGMA synchronous = NORMAL")
             if self._database.execute("SELECT COUNT(*) FROM sqlite_master").fetchone()[0]:
-                self._check_schema()
+                self._check_schema(add_metrics=add_metrics)
             else:  # a new file, or one whose run was killed before it had tables
                 with self._transaction():
                     for statement in TABLES.split(";\n"):
@@ -111,6 +133,14 @@ class Store:
         """The status of every trial that has a row, by id."""
         return dict(self._rows("SELECT id, status FROM trials"))
 
+    def stored_trials(self) -> list[StoredTrial]:
+        """Every trial that is shown."""
+        rows = self._rows(
+            "SELECT id, steps, formulation, scenario, solver, plant, reference, seed FROM trials "
+            "WHERE NOT superseded"
+        )
+        return [StoredTrial(name, Trial(*cell), steps) for name, steps, *cell in rows]
+
     def timed(self) -> set[str]:
         """The ids of the cells that have times."""
         return {row[0] for row in self._rows("SELECT id FROM times")}
@@ -133,6 +163,15 @@ class Store:
         columns = ("id", *KEYS, "steps", *NUMBERS, "environment")
         values = {name: row.get(name) for name in columns}
         self._insert("trials", {**values, "run": run, "position": position})
+
+    def record_metrics(self, trial: str, metrics: Mapping[str, float]) -> None:
+        """Commit the metrics of a trial that has a row, and nothing else of it."""
+        self._check_untouched()
+        with self._guarded():
+            self._database.execute(
+                f"UPDATE trials SET {', '.join(f'{name} = ?' for name in metrics)} WHERE id = ?",
+                [*metrics.values(), trial],
+            )
 
     def record_times(self, row: Mapping[str, Any], run: int) -> None:
         """Commit the times of a cell."""
@@ -166,6 +205,14 @@ class Store:
             raise DikbenchError(f"store {self.path}: it holds no run")
         found: dict[str, Any] = json.loads(rows[0][0])
         return found
+
+    def note(self, key: str, value: Any) -> None:
+        """Add an entry to the description of the last run."""
+        noted = json.dumps({**self.manifest(), key: value})
+        with self._guarded():
+            self._database.execute(
+                "UPDATE runs SET manifest = ? WHERE id = (SELECT MAX(id) FROM runs)", [noted]
+            )
 
     def close_neatly(self) -> None:
         """Fold the write-ahead log into the file."""
@@ -220,7 +267,7 @@ class Store:
                 f"store {self.path}: not a store of dikbench ({error}); move it away to start anew"
             ) from None
 
-    def _check_schema(self) -> None:
+    def _check_schema(self, *, add_metrics: bool) -> None:
         try:
             found = dict(self._database.execute("SELECT key, value FROM meta").fetchall())
             columns = [row[1] for row in self._database.execute("PRAGMA table_info(trials)")]
@@ -231,12 +278,14 @@ class Store:
                 f"store {self.path}: schema version {found.get('schema')!r} is not known; this "
                 f"dikbench reads version {SCHEMA}"
             )
-        missing = set(NUMBERS) - set(columns)
-        if missing:
+        missing = [name for name in NUMBERS if name not in columns]
+        if missing and not add_metrics:
             raise DikbenchError(
                 f"store {self.path}: written by a dikbench with other metrics (it lacks "
-                f"{min(missing)!r}); choose another folder"
+                f"{min(missing)!r}); choose another folder, or add them with `dikbench recompute`"
             )
+        for name in missing:
+            self._database.execute(f"ALTER TABLE trials ADD COLUMN {name} REAL")
 
     def _check_untouched(self) -> None:
         """A file that is removed or cut under an open database takes rows without a word."""

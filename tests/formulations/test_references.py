@@ -1,4 +1,4 @@
-"""The references page: every key that a law names, and no other."""
+"""The references page: every key that a law or a metric names, and no other."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 
 import formulations
 from dikbench.listing import listing
+from dikbench.metrics import METRICS
 from dikbench.registry import plugins
 from formulations import FORMULATIONS
 
@@ -24,9 +25,18 @@ def test_every_law_names_sources_that_the_page_resolves() -> None:
         assert set(keys) <= set(ENTRIES), name
 
 
+def test_every_metric_names_a_paper_that_the_page_resolves_or_is_our_own() -> None:
+    """A single key, or dikbench."""
+    for name, metric in METRICS.items():
+        keys = KEY.findall(metric.source)
+        assert len(keys) == 1 or metric.source == "dikbench", name
+        assert set(keys) <= set(ENTRIES), name
+
+
 def test_every_entry_of_the_page_is_used() -> None:
-    """No reference stands there that no law's source names."""
-    used = {key for source in SOURCES.values() for key in KEY.findall(source)}
+    """No reference stands there that no law's and no metric's source names."""
+    sources = [*SOURCES.values(), *(metric.source for metric in METRICS.values())]
+    used = {key for source in sources for key in KEY.findall(source)}
     assert set(ENTRIES) - used == set()
 
 

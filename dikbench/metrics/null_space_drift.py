@@ -1,0 +1,61 @@
+"""Whether joints come back with the hand: drift in the null space over the laps of a path."""
+
+from __future__ import annotations
+
+from math import floor
+from typing import Final
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.array import Array
+from dikbench.metrics.metric import INF, Metric
+from dikbench.motion import Motion
+
+PHASES: Final = 8
+"""Configurations are compared at so many phases of a lap."""
+
+
+def null_space_drift(motion: Motion) -> float:
+    """Mean distance of the configurations at the same phase of consecutive laps [rad].
+
+        mean over tau of |q(tau + P) (-) q(tau)|,   tau = t_0, t_0 + P/8, t_0 + 2 P/8, ...
+
+    as long as tau + P is reached, with P the period of the reference and t_0 the beginning of its
+    first lap; of the joints that move the task frame, interpolated between control steps. NaN where
+    the reference has no laps, the run does not complete one, or the task leaves the joints no
+    choice.
+    """
+    reference, robot = motion.scenario.reference, motion.scenario.robot
+    tau, period = motion.trace.tau, reference.period
+    # The last step of a run ends within half a period of control of its nominal end.
+    whole = float(tau[-1]) + 0.5 * motion.trace.dt - reference.first_lap - period
+    if not whole >= 0 or len(robot.chain) <= len(motion.scenario.rows):
+        return float("nan")
+    starts = reference.first_lap + period / PHASES * np.arange(floor(whole / period * PHASES) + 1)
+    drifts = []
+    for start in starts.tolist():
+        moved = pin.difference(robot.model, _at(motion, start), _at(motion, start + period))
+        drifts.append(np.linalg.norm(moved[robot.chain]))
+    return float(np.mean(drifts))
+
+
+def _at(motion: Motion, tau: float) -> Array:
+    """The configuration when the reference is first at a nominal time [s], (nq,)."""
+    trace = motion.trace
+    after = min(max(int(np.searchsorted(trace.tau, tau)), 1), trace.steps)
+    span = trace.tau[after] - trace.tau[after - 1]
+    share = (tau - trace.tau[after - 1]) / span if span > 0 else 1.0
+    step = min(max(share, 0.0), 1.0) * trace.dt * trace.applied[after - 1]
+    q: Array = pin.integrate(motion.scenario.robot.model, trace.q[after - 1], step)
+    return q
+
+
+NULL_SPACE_DRIFT = (
+    Metric(
+        "null_space_drift_per_lap_rad", "rad", "low", INF, "tracking error",
+        "mean distance of the configurations at the same phase of consecutive laps",
+        null_space_drift,
+        "[KleinHuang1983]",
+    ),
+)  # fmt: skip

@@ -1,0 +1,162 @@
+"""All metrics anew from stored traces: a new metric, or a mended one, needs no rerun."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from concurrent.futures import Future, as_completed
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from dikbench.errors import DikbenchError
+from dikbench.identity import trial_id
+from dikbench.metrics import evaluate
+from dikbench.motion import recompute
+from dikbench.run.progress_display import ProgressDisplay
+from dikbench.run.provenance import environment, git_commit
+from dikbench.run.results import ResultsFolder
+from dikbench.run.runner import Interrupted
+from dikbench.run.store import Store, StoredTrial
+from dikbench.run.worker import scenario_of
+from dikbench.run.worker_process import calm_down
+from dikbench.run.workers import workers
+from dikbench.scenario import Scenario
+from dikbench.trace import Trace
+
+
+@dataclass(frozen=True)
+class Recomputed:
+    """What became of the trials of a folder; those that were not recomputed keep their values.
+
+    Attributes:
+        done: number of trials whose metrics were computed anew.
+        without_trace: number of those that have moved, but whose trace was not kept.
+        changed: number of those whose law or scenario is another one today.
+        failed: reasons of those whose trace cannot be used, by the name of the trial.
+    """
+
+    done: int
+    without_trace: int
+    changed: int
+    failed: dict[str, str]
+
+    def __str__(self) -> str:
+        """One line."""
+        kept = {
+            "without a trace": self.without_trace,
+            "whose law or scenario has changed since": self.changed,
+            "whose trace cannot be used": len(self.failed),
+        }
+        left = [f"{number} {why}" for why, number in kept.items() if number]
+        rest = f"; left as they were: {', '.join(left)}" if left else ""
+        return f"{self.done} trials recomputed{rest}"
+
+
+def recompute_results(out: Path, jobs: int, command: str) -> Recomputed:
+    """Compute every metric of a results folder again from its traces, and export anew.
+
+    A trial is only recomputed if its law and scenario are still those that it was run with.
+
+    Args:
+        out: results folder.
+        jobs: number of worker processes.
+        command: the command line, for the manifest.
+
+    Raises:
+        DikbenchError: if the folder holds no results, no trace at all, or another run is at work.
+        Interrupted: if the user stops it; what is finished is kept.
+    """
+    folder = ResultsFolder(out)
+    folder.check_there()
+    with folder.lock(), folder.open_store(add_metrics=True) as store:
+        moved = [stored for stored in store.stored_trials() if stored.steps]
+        traced = [stored for stored in moved if folder.trace(stored.id).is_file()]
+        if moved and not traced:
+            raise DikbenchError(
+                f"no traces in {folder.traces}: they were not kept (`--traces none`), or removed"
+            )
+        todo = [stored for stored in traced if _is_the_same(stored)]
+        try:
+            failed = _recompute(store, folder, todo, jobs)
+        except KeyboardInterrupt:
+            folder.export(store)
+            raise Interrupted("what was recomputed is kept") from None
+        described = environment(git_commit(), command)
+        finished = datetime.now(UTC).isoformat(timespec="seconds")
+        store.note("recomputed", {"finished": finished, **described})
+        folder.export(store)
+        store.close_neatly()
+    done = len(todo) - len(failed)
+    return Recomputed(done, len(moved) - len(traced), len(traced) - len(todo), failed)
+
+
+def _is_the_same(stored: StoredTrial) -> bool:
+    """Whether a trial would be this one if it were run today."""
+    try:
+        return trial_id(stored.trial) == stored.id
+    except DikbenchError:  # the law's file is gone, the scenario has another parameter
+        return False
+
+
+def _recompute(
+    store: Store, folder: ResultsFolder, todo: Sequence[StoredTrial], jobs: int
+) -> dict[str, str]:
+    """Recompute trials in worker processes and commit each as it comes; the reasons of failures."""
+    failed: dict[str, str] = {}
+    # Scenario by scenario: a worker builds each once.
+    order = sorted(todo, key=lambda stored: (stored.trial.scenario, stored.trial.seed))
+    with (
+        workers(jobs, (__name__,)) as pool,
+        ProgressDisplay(len(todo), "recomputed trials") as display,
+    ):
+        futures: dict[Future[Any], StoredTrial] = {
+            pool.schedule(metrics_of, args=(stored, folder.trace(stored.id))): stored
+            for stored in order
+        }
+        for future in as_completed(futures):
+            stored = futures[future]
+            try:
+                metrics = future.result()
+            except Exception as error:  # a plug-in's scenario may do anything
+                failed[_name(stored)] = " ".join(str(error).split())
+            else:
+                store.record_metrics(stored.id, metrics)
+            display.advance()
+    for name, reason in failed.items():
+        print(f"not recomputed: {name}: {reason}", file=sys.stderr)
+    return failed
+
+
+def metrics_of(stored: StoredTrial, file: Path) -> dict[str, float]:
+    """In a worker process: the metrics of a trial from its trace.
+
+    Raises:
+        DikbenchError: if the trace cannot be read, or is not one of this trial.
+    """
+    calm_down()
+    scenario = scenario_of(stored.trial.scenario, stored.trial.seed)
+    trace = Trace.load(file)
+    _check_fits(trace, scenario, stored.steps, file)
+    return evaluate(recompute(trace, scenario))
+
+
+def _check_fits(trace: Trace, scenario: Scenario, steps: int, file: Path) -> None:
+    robot = scenario.robot
+    found = (trace.dt, trace.q.shape, trace.applied.shape, trace.wanted.shape)
+    expected = (
+        scenario.dt,
+        (steps + 1, robot.nq),
+        (steps, robot.nv),
+        (steps, len(scenario.rows)),
+    )
+    if found != expected:
+        raise DikbenchError(f"trace {file}: not of this trial: {found} instead of {expected}")
+
+
+def _name(stored: StoredTrial) -> str:
+    """A trial by its selectors and its id."""
+    trial = stored.trial
+    how = (trial.formulation, trial.solver, trial.scenario, trial.plant, trial.reference)
+    return f"{', '.join(how)}, seed {trial.seed} ({stored.id})"

@@ -1,0 +1,319 @@
+"""Off the path and late on it, each without the other: motions made by hand along known curves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, cast
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from scipy.optimize import minimize_scalar
+
+from dikbench.array import Array
+from dikbench.certificate import Certificate
+from dikbench.curves import circle, lemniscate
+from dikbench.metrics import evaluate
+from dikbench.motion import Motion
+from dikbench.path import Path, path_of
+from dikbench.references import Reference, target_at_rest
+from dikbench.robot_catalogue import load_robot
+from dikbench.scenario import Scenario
+from dikbench.tasks import OrientationTask, PoseTask
+from dikbench.trace import Trace
+
+DT = 0.01
+ROBOT = load_robot("panda")
+PERIOD = 2.0
+
+Place = Callable[[float], Array]
+
+
+def straight(duration: float = 2.0, speed: float = 0.3) -> Reference:
+    """Along x at a constant speed [m/s]."""
+    return Reference(
+        duration,
+        lambda tau: pin.SE3(np.eye(3), np.array([speed * tau, 0.0, 0.0])),
+        lambda tau: np.array([speed, 0, 0, 0, 0, 0]),
+    )
+
+
+def back_and_forth(duration: float = 4.0) -> Reference:
+    """Along x over 0.5 m and back on the same line, at 0.25 m/s."""
+    return Reference(
+        duration,
+        lambda tau: pin.SE3(np.eye(3), np.array([0.5 - abs(0.5 - 0.25 * tau), 0.0, 0.0])),
+        lambda tau: np.array([0.25, 0, 0, 0, 0, 0]),
+    )
+
+
+def with_dwell() -> Reference:
+    """0.3 m in a second, a second's rest, 0.3 m in another second, at constant speed."""
+
+    def x(tau: float) -> float:
+        return 0.3 * (min(tau, 1.0) + max(tau - 2.0, 0.0))
+
+    return Reference(
+        3.0,
+        lambda tau: pin.SE3(np.eye(3), np.array([x(tau), 0.0, 0.0])),
+        lambda tau: np.zeros(6),
+    )
+
+
+ROUND = circle(pin.SE3.Identity(), 0.1, PERIOD, 2.0)
+EIGHT = lemniscate(pin.SE3.Identity(), 0.1, PERIOD, 2.0)
+
+
+def of(
+    reference: Reference, place: Place, tau: Array | None = None, tracking: Any = None
+) -> Motion:
+    """The motion of a frame that is at place(t) at the trace time t; 0.01 s per step."""
+    n = round(reference.duration / DT)
+    t = DT * np.arange(n + 1)
+    tau = t if tau is None else tau
+    translations = np.array([place(time) for time in t])
+    targets = np.array([reference.placement(each).translation for each in tau.tolist()])
+    v, steps = np.zeros((n, 7)), np.zeros(n, dtype=int)
+    rows = 6 if tracking is None else 3
+    trace = Trace(
+        DT, np.tile(ROBOT.q0, (n + 1, 1)), tau, np.zeros((n, rows)), v, v, steps, steps, steps - 1,
+        steps - 1, np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n),
+    )  # fmt: skip
+    scenario = Scenario(
+        ROBOT, ROBOT.q0, v[0], reference, tracking or PoseTask(), DT, reference.duration,
+        Certificate(()),
+    )  # fmt: skip
+    position = np.linalg.norm(translations - targets, axis=1)
+    if tracking is not None:
+        position = np.full(n + 1, np.nan)
+    jacobians = np.tile(np.eye(rows, 7), (n + 1, 1, 1))
+    return Motion(trace, scenario, translations, position, np.zeros(n + 1), jacobians)
+
+
+def on(reference: Reference, delay: float = 0.0, shift: Array | None = None) -> Place:
+    """On the reference, so late [s] (resting at its start until then), and shifted [m]."""
+    offset = np.zeros(3) if shift is None else shift
+    return lambda t: cast(Array, reference.placement(max(t - delay, 0.0)).translation + offset)
+
+
+@pytest.mark.parametrize("reference", [straight(), ROUND, EIGHT], ids=["line", "circle", "eight"])
+@pytest.mark.parametrize("delay", [0.0, 0.1, 0.237])
+def test_a_frame_that_is_late_on_the_path_has_lag_and_no_contour_error(
+    reference: Reference, delay: float
+) -> None:
+    """The lag is the delay, wherever a sample falls; the path's own pieces are within a micron."""
+    got = evaluate(of(reference, on(reference, delay)))
+    assert got["lag_max_s"] == pytest.approx(delay, abs=1e-4)
+    assert got["lag_final_s"] == pytest.approx(delay, abs=1e-4)
+    assert got["contour_error_max_m"] < 2e-6
+    assert delay == 0.0 or got["position_error_max_m"] > 0.02
+
+
+def test_a_frame_beside_a_line_has_contour_error_and_no_lag() -> None:
+    """3 mm to the side, all the way."""
+    got = evaluate(of(straight(), on(straight(), 0.0, np.array([0.0, 3e-3, 0.0]))))
+    for name in ("rms", "p95", "max", "final"):
+        assert got[f"contour_error_{name}_m"] == pytest.approx(3e-3, abs=1e-9)
+    assert got["lag_max_s"] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("radius", [0.097, 0.103])
+def test_a_frame_inside_or_outside_a_circle_has_contour_error_and_no_lag(radius: float) -> None:
+    """On a circle about the same centre, 3 mm smaller or larger than 0.1 m."""
+
+    def place(t: float) -> Array:
+        angle = 2 * math.pi / PERIOD * t
+        return np.array([0.0, radius * math.sin(angle), 0.1 - radius * math.cos(angle)])
+
+    got = evaluate(of(ROUND, place))
+    assert got["contour_error_rms_m"] == pytest.approx(3e-3, abs=2e-6)
+    assert got["contour_error_max_m"] == pytest.approx(3e-3, abs=2e-6)
+    assert got["lag_max_s"] == pytest.approx(0.0, abs=1e-4)
+
+
+def test_off_the_path_and_late_are_told_apart_in_one_motion() -> None:
+    """0.1 s late and 3 mm to the side: both, each at its value; the quantile is the 95th."""
+    got = evaluate(of(straight(), on(straight(), 0.1, np.array([0.0, 0.0, 3e-3]))))
+    assert got["contour_error_max_m"] == pytest.approx(3e-3, abs=1e-9)
+    assert got["lag_final_s"] == pytest.approx(0.1, abs=1e-9)
+    # 200 steps, the excursion rising from 0 to 2 cm: of 201 samples the quantile is the 190th step.
+    rising = evaluate(of(straight(), lambda t: np.array([0.3 * t, 0.01 * t, 0.0])))
+    assert rising["contour_error_p95_m"] == pytest.approx(0.019, abs=1e-9)
+
+
+def test_the_nearest_point_may_be_where_the_target_is_not() -> None:
+    """Contour error is the distance from the set: far ahead or a lap behind count as well."""
+    ahead = evaluate(of(straight(), lambda t: np.array([0.45, 0.0, 0.02])))
+    assert ahead["contour_error_max_m"] == pytest.approx(0.02, abs=1e-9)
+    late = evaluate(of(ROUND, on(ROUND, PERIOD)))
+    assert late["contour_error_max_m"] < 2e-6
+    assert late["position_error_final_m"] < 1e-9
+
+
+@pytest.mark.parametrize("point", [0.0, 0.4, 1.13])
+def test_a_frame_that_rests_while_the_target_laps_it_is_late_by_laps(point: float) -> None:
+    """It stops on the circle, and nearest points of the next laps are not taken for its own."""
+    stop = ROUND.placement(point).translation
+    got = evaluate(of(ROUND, lambda t: ROUND.placement(t).translation if t < point else stop))
+    assert got["lag_final_s"] == pytest.approx(2 * PERIOD - point, abs=1e-3)
+    assert got["contour_error_max_m"] < 2e-6
+
+
+def test_a_crossing_does_not_lead_onto_the_other_branch() -> None:
+    """Late by more than half a figure of eight, past its middle: still on its own branch."""
+    delay = 0.6 * PERIOD
+    shifted = of(EIGHT, on(EIGHT, delay, np.array([5e-4, 0.0, 0.0])))
+    assert evaluate(shifted)["lag_max_s"] == pytest.approx(delay, abs=1e-3)
+    assert np.all(np.diff(shifted.lag) < DT + 1e-9)
+
+
+def test_a_way_back_that_begins_too_early_is_found() -> None:
+    """The frame turns 2 cm before the end of its line, and is on the way back when it is there."""
+    turn = 0.48
+
+    def place(t: float) -> Array:
+        late = max(t - 0.08, 0.0)  # 2 cm at 0.25 m/s
+        return np.array([max(turn - abs(turn - 0.25 * late), 0.0), 0.0, 0.0])
+
+    got = evaluate(of(back_and_forth(), place))
+    assert got["contour_error_max_m"] < 1e-9
+    # On the way back it is ahead of the target, and waits for nobody.
+    assert got["lag_final_s"] == pytest.approx(0.0, abs=1e-3)
+    assert got["lag_max_s"] < 0.25
+
+
+def test_a_frame_that_is_pushed_back_falls_behind_and_its_nearest_point_stays() -> None:
+    """At 0.3 m after 1 s, then back at half the speed: of 1 s that is left, 1 s of delay."""
+
+    def place(t: float) -> Array:
+        return np.array([0.3 * min(t, 1.0) - 0.15 * max(t - 1.0, 0.0), 0.0, 0.0])
+
+    got = evaluate(of(straight(), place))
+    assert got["lag_final_s"] == pytest.approx(1.0, abs=1e-9)
+    assert got["contour_error_max_m"] < 1e-9
+
+
+def test_a_dwell_is_no_delay() -> None:
+    """1 mm short of where the target rests, the frame is late by the time of a millimetre."""
+    reference = with_dwell()
+
+    def place(t: float) -> Array:
+        x = reference.placement(t).translation[0]
+        return np.array([min(x, 0.299), 0.0, 0.0])
+
+    motion = of(reference, place)
+    assert motion.lag[150] == pytest.approx(1e-3 / 0.3, abs=1e-6)
+    assert motion.lag[-1] == pytest.approx(0.301 / 0.3, abs=1e-6)
+
+
+def test_a_target_that_waits_is_late_itself() -> None:
+    """In a path-indexed run that makes half the way per step, the delay is that of the target."""
+    tau = 0.5 * DT * np.arange(201)
+    motion = of(straight(), lambda t: np.array([0.15 * t, 0.0, 0.0]), tau)
+    got = evaluate(motion)
+    assert got["position_error_max_m"] == pytest.approx(0.0, abs=1e-12)
+    assert got["lag_final_s"] == pytest.approx(1.0, abs=1e-9)
+    assert got["lag_max_s"] == pytest.approx(1.0, abs=1e-9)
+
+
+def test_a_target_at_rest_has_itself_for_a_path_and_nothing_to_be_late_on() -> None:
+    """The contour error is the position error, the lag is not defined."""
+    target = target_at_rest(pin.SE3.Identity(), 1.0)
+    got = evaluate(of(target, lambda t: np.array([0.1 * t, 0.0, 0.0])))
+    assert got["contour_error_final_m"] == got["position_error_final_m"] == pytest.approx(0.1)
+    assert math.isnan(got["lag_max_s"])
+    assert math.isnan(got["lag_final_s"])
+
+
+def test_a_rotation_in_place_has_a_point_for_a_path() -> None:
+    """The distance from it is the contour error; there is no way to be late on."""
+    turning = Reference(
+        1.0,
+        lambda tau: pin.SE3(pin.utils.rotate("z", tau), np.zeros(3)),
+        lambda tau: np.array([0, 0, 0, 0, 0, 1.0]),
+    )
+    got = evaluate(of(turning, lambda t: np.array([0.0, 0.2 * t, 0.0])))
+    assert got["contour_error_max_m"] == pytest.approx(0.2)
+    assert math.isnan(got["lag_max_s"])
+
+
+def test_an_orientation_task_has_neither() -> None:
+    """Where the origin is does not matter to it."""
+    got = evaluate(of(straight(), on(straight(), 0.1), tracking=OrientationTask()))
+    assert all(math.isnan(value) for name, value in got.items() if "contour" in name)
+    assert math.isnan(got["lag_max_s"])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_distances_are_the_least_over_the_curve(seed: int) -> None:
+    """Points about a circle, a figure of eight and a polygon, against minimisation over time."""
+    random = np.random.default_rng(seed)
+    corners = random.uniform(-0.2, 0.2, (6, 3))
+    polygon = Reference(
+        5.0,
+        lambda tau: pin.SE3(
+            np.eye(3),
+            np.array([np.interp(tau, np.arange(6), corners[:, axis]) for axis in range(3)]),
+        ),
+        lambda tau: np.zeros(6),
+    )
+    for reference in (ROUND, EIGHT, polygon):
+        path = path_of(reference, reference.duration, DT)
+        points = np.array(
+            [reference.placement(tau).translation for tau in random.uniform(0, 4, 12)]
+        )
+        points += random.normal(size=(12, 3)) * random.choice([1e-5, 1e-3, 0.1], size=(12, 1))
+        points[0] = [0.0, 0.0, 0.1]  # the centre of the circle: every point is the nearest
+        expected = [least_distance(reference, point) for point in points]
+        np.testing.assert_allclose(path.distances(points), expected, atol=3e-6)
+
+
+def test_the_nearest_piece_may_end_farther_away_than_many_vertices() -> None:
+    """The middle of a long piece, 1 mm away, among short ones at more than 1.2 mm."""
+    short = np.array([[0.0, 2.2e-3 + 1e-5 * k, 0.0] for k in range(40)])
+    vertices = np.vstack([[[-2.5e-3, 0, 0], [2.5e-3, 0, 0]], short])
+    arcs = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(vertices, axis=0), axis=1)))
+    path = Path(arcs, arcs, arcs, vertices, arcs, len(vertices) - 1)
+    assert path.distances(np.array([[-5e-4, 1e-3, 0.0]])) == pytest.approx(1e-3, abs=1e-12)
+
+
+def least_distance(reference: Reference, point: Array) -> float:
+    """From a point to the curve, by samples and golden sections about the best of them."""
+    instants = np.linspace(0, reference.duration, 1001)
+
+    def away(tau: float) -> float:
+        return float(np.linalg.norm(reference.placement(tau).translation - point))
+
+    best = instants[np.argsort([away(tau) for tau in instants.tolist()])[:8]]
+    step = instants[1]
+    return min(
+        minimize_scalar(
+            away, bounds=(tau - step, tau + step), method="bounded", options={"xatol": 1e-9}
+        ).fun
+        for tau in np.clip(best, step, reference.duration - step).tolist()
+    )
+
+
+def test_recovery_is_timed_from_the_largest_error() -> None:
+    """Largest at 0.3 s, below 1 mm for a while, above again, and for good from 0.8 s on."""
+
+    def errors(t: float) -> float:
+        if round(t, 2) == 0.3:
+            return 0.05
+        return 0.002 if 0.2 <= round(t, 2) < 0.5 or 0.6 <= round(t, 2) < 0.8 else 0.0005
+
+    target = target_at_rest(pin.SE3.Identity(), 1.0)
+    got = evaluate(of(target, lambda t: np.array([errors(t), 0.0, 0.0])))
+    assert got["recovery_time_s"] == pytest.approx(0.5)
+    never = evaluate(of(target, lambda t: np.array([0.002 * t, 0.0, 0.0])))
+    assert never["recovery_time_s"] == math.inf
+    quiet = evaluate(of(target, lambda t: np.array([0.0009, 0.0, 0.0])))
+    assert math.isnan(quiet["recovery_time_s"])
+
+
+def test_the_lag_does_not_depend_on_how_finely_the_run_is_sampled() -> None:
+    """A run of 5000 steps, of which only some are looked at closely, has every step's lag."""
+    slow = straight(50.0, 0.012)
+    motion = of(slow, on(slow, 0.1))
+    np.testing.assert_allclose(motion.lag[10:], 0.1, atol=1e-6)
