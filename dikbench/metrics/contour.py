@@ -31,7 +31,7 @@ CONTOUR = (
     ),
     Metric(
         "lag_max_s", "s", "low", INF, "tracking error",
-        "largest delay on the path: nominal time from the nearest point to the target, and its own wait",
+        "largest delay on the path: nominal time to go to the target, and how late that is itself",
         lambda m: largest(m.lag),
     ),
     Metric(
