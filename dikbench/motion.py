@@ -109,8 +109,8 @@ class Motion:
         The nominal time that the reference takes on its way from the nearest point of the path (see
         `follow_path`) to the target, without dwells, in which nothing is to be caught up; and, as a
         path-indexed target waits, by how much it is late itself: trace time - tau, 0 where the
-        reference moves on with the clock. NaN where the task is about the orientation only, or
-        there is no way to go.
+        reference moves on with the clock. Where the reference is slow, a small distance is a long
+        delay. NaN where the task is about the orientation only, or there is no way to go.
         """
         path, tau = self.scenario.path, self.trace.tau
         if path is None or path.is_point or np.isnan(self.position_error[0]):

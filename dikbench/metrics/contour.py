@@ -31,7 +31,7 @@ CONTOUR = (
     ),
     Metric(
         "lag_max_s", "s", "low", INF, "tracking error",
-        "largest delay along the path: of the nearest point behind the target, and of the target",
+        "largest delay on the path: nominal time to go to the target, and how late that is itself",
         lambda m: largest(m.lag),
     ),
     Metric(

@@ -87,6 +87,7 @@ def test_help_does_not_import_anything_heavy() -> None:
         (("run", "--reference", "space"), ("space", "path")),
         (("run", "--seed", "-1"), ("-1",)),
         (("run", "--out", "afile/inside", "--formulation", "dls"), ("afile/inside",)),
+        (("recompute", "nowhere"), ("no results", "nowhere")),
         (("list", "laws"), ("laws", "formulations")),
         (("show", "nothing"), ("nothing", "valid")),
         (("--plnt",), ("--plnt",)),

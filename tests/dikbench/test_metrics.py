@@ -254,10 +254,16 @@ def test_what_a_solver_leaves_is_not_a_violation() -> None:
     """A limit passed by less than 1e-4 does not make a step violate it; by more it does."""
     scenario = _scenario()
     for excess, share in ((1e-12, 0.0), (0.9e-4, 0.0), (1.1e-4, 1.0)):
-        limit = scenario.robot.with_limits(position=5.0, velocity=1.0 - excess)
+        limit = scenario.robot.with_limits(
+            position=([-5, -5, -5], [0.1 - excess, 5, 5]),
+            velocity=1.0 - excess,
+            acceleration=(0.5 - excess) / 0.1,  # from 0.5 to 1 rad/s in a step of 0.1 s
+        )
         trace = _trace([1.0], [[0.4, 0.5, 1.0]], [Status.OK])
         got = evaluate(recompute(trace, replace(scenario, robot=limit)))
         assert got["violating_share"] == share
+        for kind in ("position", "velocity", "acceleration"):
+            assert got[f"{kind}_violation_share"] == share
 
 
 def test_a_start_outside_a_limit_is_not_a_step_that_violates_it() -> None:
@@ -266,7 +272,8 @@ def test_a_start_outside_a_limit_is_not_a_step_that_violates_it() -> None:
     limit = scenario.robot.with_limits(position=([0.05, -2, -2], 2.0), velocity=2.0)
     trace = _trace([1.0], [[0.4, 0.5, 1.0]], [Status.OK])
     got = evaluate(recompute(trace, replace(scenario, robot=limit)))
-    assert got["violating_share"] == 0.0
+    assert got["violating_share"] == got["position_violation_share"] == 0.0
+    assert got["position_violation_integral_rad_s"] == 0.0
     assert got["position_violation_max_rad"] == pytest.approx(0.05)
 
 
