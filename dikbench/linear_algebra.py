@@ -61,7 +61,8 @@ def damped_least_squares(A: Array, b: Array, squared_damping: float) -> Array:
     if info or min(pivots) < ILL_CONDITIONED * max(pivots):
         lost = np.finfo(float).eps * max(m, n) * float(np.linalg.norm(A))
         return DampedInverse(A, lost, squared_damping**0.5).times(b)
-    return y.dot(A) if m <= n else y
+    x: Array = y.dot(A) if m <= n else y
+    return x
 
 
 @lru_cache(maxsize=64)
