@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from dikbench.array import Array
+from dikbench.contract_states import SINGULAR
 from dikbench.errors import DikbenchError, Infeasible
 from dikbench.kinematics import Kinematics
 from dikbench.linear_algebra import null_space
@@ -258,9 +259,31 @@ def test_manipulability_gradient_is_the_derivative(name: str) -> None:
         assert found == pytest.approx(expected, abs=1e-8)
 
 
+@pytest.mark.parametrize("eps", [1e-2, 1e-5, 1e-8, 1e-11], ids=str)
+def test_manipulability_gradient_near_a_singularity(eps: float) -> None:
+    """On a planar arm w = l_1 l_2 |sin q_2|: next to the stretched arm it rises with q_2."""
+    robot = load_robot("planar3r")
+    kinematics, rows = Kinematics(robot), list(robot.task_rows)
+    kinematics.update(np.array([0.4, eps, 0.7]))
+    found = manipulability_gradient(kinematics.jacobian(robot.frame_id)[rows])
+    kinematics.update(np.array([0.4, np.pi / 2, 0.7]))
+    J = kinematics.jacobian(robot.frame_id)[rows]
+    slope = abs(float(np.linalg.det(J))) * np.cos(eps)  # l_1 l_2 cos q_2
+    assert found == pytest.approx([0, slope, 0], abs=1e-4 * slope)
+
+
 def test_manipulability_has_no_gradient_at_a_singularity() -> None:
-    """Where it is zero."""
+    """Where it is zero, up to rounding too, and where the rows are more than the joints."""
     assert np.array_equal(manipulability_gradient(np.zeros((6, 7))), np.zeros(7))
+    tall = np.random.default_rng(0).normal(size=(6, 5))
+    assert np.array_equal(manipulability_gradient(tall), np.zeros(5))
+    for name, places in SINGULAR.items():
+        robot = load_robot(name)
+        kinematics = Kinematics(robot)
+        for q in places:
+            kinematics.update(np.array(q, dtype=float))
+            J = kinematics.jacobian(robot.frame_id)[list(robot.task_rows)]
+            assert np.array_equal(manipulability_gradient(J), np.zeros(robot.nv))
 
 
 # --- kernels
