@@ -202,6 +202,35 @@ def test_upright_there_are_no_rates() -> None:
         twist_from_rates(pin.rpy.rpyToMatrix(np.array([0.2, np.pi / 2, 0.4])))
 
 
+# --- Pink's and mink's program
+
+
+@pytest.mark.parametrize("law", ["pink-qp", "mink-qp"])
+def test_a_joint_without_acceleration_limit_at_its_position_limit_has_no_brake(law: str) -> None:
+    """Infinite deceleration over no distance, and none over an infinite one, bound nothing."""
+    robot = load_robot("panda")
+    assert robot.limits.position is not None
+    highest = robot.limits.position.upper.copy()
+    highest[1] = np.inf
+    deceleration = np.array([np.inf, 0.0, 20, 20, 20, 20, 20])
+    robot = robot.with_limits(
+        position=(robot.limits.position.lower, highest),
+        acceleration=(-deceleration, np.full(7, 20.0)),
+    )
+    q = robot.q0.copy()
+    q[0] = highest[0]
+    kinematics = Kinematics(robot)
+    kinematics.update(q)
+    J = kinematics.jacobian(robot.frame_id)
+    wanted = np.array([-0.1, 0.1, 0.1, -0.1, 0.1, -0.1, 0.1])
+    tasks = [LinearizedTask(J, J @ wanted, np.zeros(6))]
+    damped = make_formulation("dls[damping=0.01]")
+    problem = DikProblem(robot, q, None, DT, tasks, robot.limits.at(q))
+    expected = damped.velocity(problem, make_solve(None, None))
+    assert expected[0] < 0
+    assert _velocity(f"{law}[damping=0.01]", problem) == pytest.approx(expected, abs=1e-8)
+
+
 # --- NEO
 
 
