@@ -22,7 +22,7 @@ from dikbench.robot import Robot
 from dikbench.robot_catalogue import load_robot
 from dikbench.solvers.catalogue import parse_solver
 from dikbench.solvers.checked import make_solve
-from dikbench.tasks import LinearizedTask, PositionTask, PostureTask
+from dikbench.tasks import LinearizedTask, OrientationTask, PositionTask, PostureTask
 from formulations.lp_alpha_components import twist_from_rates
 from formulations.lu_kernel import lu_kernel
 from formulations.manipulability import manipulability_gradient
@@ -179,6 +179,49 @@ def test_components_keep_axes_that_the_whole_would_slow_down() -> None:
         assert alphas.sum() >= 6 * common - 1e-6
         gained += alphas.sum() > 6 * common + 0.1
     assert gained > 20
+
+
+def test_components_of_an_orientation_are_roll_pitch_and_yaw() -> None:
+    """Each rate of the frame is a share of the wanted one, and they add up to the most there is."""
+    random = np.random.default_rng(8)
+    held_back = 0
+    for problem in _problems(20, 0.0, "none"):
+        kinematics = Kinematics(problem.robot)
+        kinematics.update(problem.q)
+        R = kinematics.placement(problem.robot.frame_id).rotation
+        target = R @ pin.exp3(random.uniform(-1, 1, 3))
+        task = OrientationTask(target=target, gain=20.0).linearize(kinematics)
+        problem.tasks[:] = [task]
+        v = _velocity("lp-alpha-components[regularization=0]", problem)
+        E = twist_from_rates(R)[3:, 3:]
+        alphas = np.linalg.solve(E, task.J @ v) / np.linalg.solve(E, task.V)
+        common = _alpha(problem, _velocity("lp-alpha[regularization=0]", problem))
+        assert np.all((alphas >= -1e-6) & (alphas <= 1 + 1e-6))
+        assert alphas.sum() >= 3 * common - 1e-6
+        held_back += alphas.min() < 0.99
+    assert held_back > 10
+
+
+def test_components_of_a_position_need_no_rates_of_roll_and_yaw() -> None:
+    """Also where the frame's x axis stands upright, where those of a pose are not defined."""
+    robot = load_robot("panda")
+    kinematics = Kinematics(robot)
+    q = robot.q0.copy()
+    for _ in range(50):  # turn the x axis up
+        kinematics.update(q)
+        R = kinematics.placement(robot.frame_id).rotation
+        axis = np.cross([1.0, 0.0, 0.0], R.T[:, 2])
+        J = kinematics.jacobian(robot.frame_id)
+        q = pin.integrate(robot.model, q, 0.5 * np.linalg.pinv(J[3:], rcond=1e-3) @ axis)
+    kinematics.update(q)
+    R = kinematics.placement(robot.frame_id).rotation
+    with pytest.raises(Infeasible, match="no rates near cos"):
+        twist_from_rates(R)
+    point = kinematics.placement(robot.frame_id).translation + np.array([0.01, -0.02, 0.01])
+    task = PositionTask(target=point).linearize(kinematics)
+    problem = DikProblem(robot, q, None, DT, [task], robot.limits.at(q))
+    v = _velocity("lp-alpha-components", problem)
+    assert task.J @ v == pytest.approx(task.V, abs=1e-6)
 
 
 @given(
