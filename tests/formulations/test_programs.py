@@ -13,7 +13,7 @@ from hypothesis.extra.numpy import arrays
 
 from dikbench.array import Array
 from dikbench.contract_states import SINGULAR
-from dikbench.errors import DikbenchError, Infeasible
+from dikbench.errors import DikbenchError, Infeasible, SolverFailed
 from dikbench.kinematics import Kinematics
 from dikbench.linear_algebra import null_space
 from dikbench.problem import DikProblem, program_of
@@ -114,6 +114,25 @@ def test_the_weighted_program_tends_to_the_hierarchy() -> None:
 
 
 # --- programs without limits, and with velocity limits only
+
+
+def test_three_levels_are_answered_where_bounds_bind() -> None:
+    """Position, orientation and posture of a fast hand, a level hardly damped in between."""
+    answered = 0
+    for problem in _problems(60, 1.5):
+        hand, posture = problem.tasks
+        position = LinearizedTask(hand.J[:3], hand.V[:3], np.zeros(3))
+        orientation = LinearizedTask(hand.J[3:], hand.V[3:], np.zeros(3), priority=2)
+        posture.priority = 3
+        problem.tasks[:] = [position, orientation, posture]
+        try:
+            v = _velocity("hqp", problem)
+        except SolverFailed:
+            continue
+        answered += 1
+        box = problem.box()
+        assert np.all((box.lower - 1e-9 <= v) & (v <= box.upper + 1e-9))
+    assert answered >= 58
 
 
 def test_least_squares_in_velocity_limits_is_damped_least_squares_where_none_binds() -> None:
