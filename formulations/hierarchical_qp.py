@@ -44,7 +44,7 @@ class HierarchicalQp:
 
     Attributes:
         damping: lambda, unsquared, of the last level.
-        rank_tolerance: singular values up to this count as zero (absolute, units of J).
+        rank_tolerance: singular values up to this count as zero (absolute, units of weighted J_k).
         braking: how the box approaches a position limit (see `dikbench.box`).
 
     Source: [Kanoun2011]; [Escande2014].
