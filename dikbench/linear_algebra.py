@@ -12,6 +12,9 @@ from dikbench.array import Array
 
 Projector = Literal["exact", "damped"]
 
+ILL_CONDITIONED = 1e-4
+"""Ratio of the pivots of a Gram matrix's triangle below which it is not to be trusted."""
+
 
 def thin_svd(A: Array) -> tuple[Array, Array, Array]:
     """U (m, k), singular values (k,) falling, V^T (k, n) of A (m, n), k = min(m, n)."""
@@ -47,15 +50,19 @@ def damped_least_squares(A: Array, b: Array, squared_damping: float) -> Array:
     """The minimiser (n,) of ||A x - b||^2 + lambda^2 ||x||^2 for A (m, n), b (m,).
 
     The smaller of the two Gram matrices is factorised: A A^T where the rows are fewer, else A^T A.
-    Without damping, where that matrix is singular, the shortest minimiser.
+    Where that would lose more than half of the digits, (almost) undamped at a singularity, the
+    singular values serve instead; undamped where rank is lost, the shortest minimiser.
     """
     m, n = A.shape
     damped = A.dot(A.T) if m <= n else A.T.dot(A)
     damped.flat[:: len(damped) + 1] += squared_damping
-    y = solve_positive_definite(damped, b if m <= n else b.dot(A))
-    if y is None:  # (almost) no damping, at a singularity
-        return least_norm(A, b, np.finfo(float).eps)
-    return y.dot(A) if m <= n else y
+    factor, y, info = dposv(damped, b if m <= n else b.dot(A))
+    pivots = factor.diagonal().tolist()  # their ratio bounds the condition number, from below
+    if info or min(pivots) < ILL_CONDITIONED * max(pivots):
+        lost = np.finfo(float).eps * max(m, n) * float(np.linalg.norm(A))
+        return DampedInverse(A, lost, squared_damping**0.5).times(b)
+    x: Array = y.dot(A) if m <= n else y
+    return x
 
 
 @lru_cache(maxsize=64)

@@ -34,7 +34,8 @@ class ConditionGovernor:
     the range, and stop above kappa_stop whatever the direction.
 
     Attributes:
-        slow: kappa_slow, where slowing down begins.
+        slow: kappa_slow, where slowing down begins; at their safe starts the arms here have 7 to 18
+            (TIAGo and the LWR are beyond the default).
         stop: kappa_stop, where approaching ends.
         after: what to do with a velocity outside the limits; the source scales.
         rank_tolerance: singular values up to this count as zero (absolute, units of J); such a

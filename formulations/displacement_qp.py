@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from dikbench.array import Array
+from dikbench.box import sqrt_brake
 from dikbench.errors import DikbenchError
 from dikbench.linear_algebra import scaled_identity
 from dikbench.problem import DikProblem, LimitKind, Solve
@@ -64,12 +65,11 @@ class DisplacementQp:
         lower, upper = box.lower, box.upper
         acceleration, limits = problem.limits.joint.acceleration, problem.limits
         if acceleration is not None and limits.to_lower is not None and limits.to_upper is not None:
-            lower = np.maximum(lower, -_braking(acceleration.upper, limits.to_lower))
-            upper = np.minimum(upper, _braking(-acceleration.lower, limits.to_upper))
+            lower = np.maximum(lower, -_braking(limits.to_lower, acceleration.upper, problem.dt))
+            upper = np.minimum(upper, _braking(limits.to_upper, -acceleration.lower, problem.dt))
         return solve(QuadraticProgram(P, q, lb=lower, ub=upper))
 
 
-def _braking(deceleration: Array, distance: Array) -> Array:
+def _braking(distance: Array, deceleration: Array, dt: float) -> Array:
     """sqrt(2 a d), (nv,) [rad/s]; no bound outside a limit, where the box asks for the way back."""
-    speed = np.sqrt(2 * deceleration * np.maximum(distance, 0.0))
-    return np.where(distance < 0, np.inf, speed)
+    return np.where(distance < 0, np.inf, sqrt_brake(distance, deceleration, dt))

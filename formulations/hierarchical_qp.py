@@ -9,15 +9,20 @@ import numpy as np
 
 from dikbench.array import Array
 from dikbench.box import Box, Braking
-from dikbench.errors import DikbenchError
+from dikbench.errors import DikbenchError, SolverFailed
 from dikbench.linear_algebra import null_space
 from dikbench.problem import DikProblem, LimitKind, Solve
 from dikbench.quadratic_program import Program, QuadraticProgram
 from formulations.null_space_program import limits_about
 
 UNIQUE = 1e-5
-"""Damping of the levels above the last: solvers are exact on strictly convex programs, and a task
-gives way by (1e-5/sigma)^2 of its velocity along a direction with the singular value sigma."""
+"""Damping of the levels above the last: makes their programs strictly convex, and a task gives way
+by (1e-5/sigma)^2 of its velocity along a direction with the singular value sigma."""
+
+ATTEMPTS = 4
+"""Of a level below the first, each with ten times the damping of the one before: z = 0 is feasible,
+but active-set methods take bounds for contradictory that a hardly damped direction makes nearly
+parallel."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +35,8 @@ class HierarchicalQp:
 
     over the priority levels k = 1, ..., K; J_k (m_k, nv) and V_k (m_k,) are level k's rows
     multiplied by the square roots of their weights, poses in the task frame; v in rad/s; lo and hi
-    the velocity box. The last level adds 1/2 lambda^2 ||v||^2, the others do with lambda = 1e-5.
+    the velocity box. The last level adds 1/2 lambda^2 ||v||^2, the others do with lambda = 1e-5;
+    below the first, where the solver fails, ten times more is tried, up to a thousand times.
     What the levels above have reached is kept by moving in the null space of their rows,
     v = v_(k-1) + N z, so that no solver's tolerance lets it go. With one level it is `qp`, with no
     bound active `nullspace`. Singular where a task is, but inside the limits; leaves the course
@@ -38,7 +44,7 @@ class HierarchicalQp:
 
     Attributes:
         damping: lambda, unsquared, of the last level.
-        rank_tolerance: singular values up to this count as zero (absolute, units of J).
+        rank_tolerance: singular values up to this count as zero (absolute, units of weighted J_k).
         braking: how the box approaches a position limit (see `dikbench.box`).
 
     Source: [Kanoun2011]; [Escande2014].
@@ -70,7 +76,15 @@ class HierarchicalQp:
             A = scale[:, None] * level.J @ N
             last = number == len(levels) - 1
             damping = self.damping if last else UNIQUE
-            z = solve(_level(A, scale * (level.V - level.J @ v), v, N, box, damping, problem))
+            r = scale * (level.V - level.J @ v)
+            for attempts_left in reversed(range(ATTEMPTS if number else 1)):
+                try:
+                    z = solve(_level(A, r, v, N, box, damping, problem))
+                    break
+                except SolverFailed:
+                    if not attempts_left:
+                        raise
+                    damping = max(10 * damping, UNIQUE)
             v = v + N @ z
             if not last:
                 free = null_space(A, self.rank_tolerance)

@@ -25,9 +25,9 @@ class LpAlpha:
 
     J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s. A linear program
     where rho = 0; its vertices are not unique where the arm has a null space and v then chatters,
-    which a small rho cures. Never off course and inside every limit; slows down, and where the
-    wanted direction is lost the frame stops (with rho = 0 the joints need not: alpha = 0 leaves the
-    null space of a singular J free). Weights play no part.
+    which a small rho cures, for at most rho/2 ||v||^2 of alpha. Never off course and inside every
+    limit; slows down, and where the wanted direction is lost the frame stops (with rho = 0 the
+    joints need not: alpha = 0 leaves the null space of a singular J free). Weights play no part.
 
     Attributes:
         regularization: rho; None: 1e-4 if the arm has more joints than the task has rows, else 0.

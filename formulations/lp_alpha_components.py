@@ -13,6 +13,8 @@ from dikbench.box import Braking
 from dikbench.errors import DikbenchError, Infeasible
 from dikbench.problem import DikProblem, LimitKind, Solve
 from dikbench.quadratic_program import Program, QuadraticProgram
+from dikbench.tasks.orientation import LinearizedOrientation
+from dikbench.tasks.task import LinearizedTask
 from formulations.lp_alpha import regularization_for
 
 UPRIGHT = 1e-3
@@ -37,8 +39,8 @@ class LpAlphaComponents:
         braking: how the box approaches a position limit (see `dikbench.box`).
 
     Raises:
-        Infeasible: near cos(pitch) = 0, where E has no inverse; if the task is neither a pose nor a
-            position.
+        Infeasible: near cos(pitch) = 0, where E has no inverse (that of a position has one); if
+            the task is neither a pose nor a position nor an orientation.
 
     Source: [Tedrake] (the component-wise relaxation for teleoperation).
     """
@@ -60,8 +62,9 @@ class LpAlphaComponents:
         m, n = task.J.shape
         pin.forwardKinematics(robot.model, robot.scratch, problem.q)
         rotation = pin.updateFramePlacement(robot.model, robot.scratch, robot.frame_id).rotation
-        rows = _rows(robot.task_rows, m)
-        E = twist_from_rates(rotation)[np.ix_(rows, rows)]
+        rows = _rows(task, robot.task_rows)
+        rates = twist_from_rates(rotation) if rows[-1] >= 3 else rotation.T
+        E = rates[np.ix_(rows, rows)]
         P = np.zeros((n + m, n + m))
         P[:n, :n].flat[:: n + 1] = regularization_for(task, self.regularization)
         q = np.concatenate([np.zeros(n), -np.ones(m)])
@@ -72,12 +75,14 @@ class LpAlphaComponents:
         return solve(QuadraticProgram(P, q, A=A, b=np.zeros(m), lb=lower, ub=upper))[:n]
 
 
-def _rows(rows: tuple[int, ...], m: int) -> list[int]:
-    """The rows of the twist that a task of m rows is about: a whole pose, or a position."""
-    for kept in (list(rows), [row for row in rows if row < 3]):
-        if len(kept) == m:
+def _rows(task: LinearizedTask, rows: tuple[int, ...]) -> list[int]:
+    """The rows of the twist that a task is about: a whole pose, a position or an orientation."""
+    turns = isinstance(task, LinearizedOrientation)
+    part = [row for row in rows if (row >= 3) == turns]
+    for kept in (list(rows), part):
+        if len(kept) == len(task.V):
             return kept
-    raise Infeasible("components are those of a pose or a position, not of several tasks")
+    raise Infeasible("components are those of a pose or a part of it, not of several tasks")
 
 
 def twist_from_rates(rotation: Array) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dikbench.array import Array
+from dikbench.linear_algebra import thin_svd
 
 
 def manipulability_gradient(J: Array) -> Array:
@@ -20,11 +21,12 @@ def manipulability_gradient(J: Array) -> Array:
     Manipulator differential kinematics, part 2.
     """
     m, n = J.shape
-    gram = J @ J.T
-    determinant = float(np.linalg.det(gram))
-    if determinant <= np.finfo(float).tiny:
+    if m > n:
         return np.zeros(n)
-    inverse = np.linalg.solve(gram, J)  # (J^+)^T
+    U, singular, Vt = thin_svd(J)
+    if singular[-1] <= np.finfo(float).eps * n * singular[0]:
+        return np.zeros(n)
+    inverse = (U / singular).dot(Vt)  # (J^+)^T
     linear, angular = (J[:3], J[3:]) if m == 6 else (_in_space(J[:2], 0), _in_space(J[2:], 2))
     gradient = np.zeros(n)
     for k in range(1, n):
@@ -33,7 +35,7 @@ def manipulability_gradient(J: Array) -> Array:
         moved = np.cross(linear[:, :k], w, axis=0) + np.cross(angular[:, :k], v, axis=0)
         change = np.vstack([moved, turned]) if m == 6 else np.vstack([moved[:2], turned[2:]])
         gradient[k] = np.einsum("ij,ij->", inverse[:, :k], change)
-    result: Array = np.sqrt(determinant) * gradient
+    result: Array = singular.prod() * gradient
     return result
 
 

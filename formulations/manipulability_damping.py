@@ -27,7 +27,8 @@ class ManipulabilityDamping:
     Attributes:
         damping: lambda_0, unsquared (units of J), at the singularity itself.
         threshold: w_0, the manipulability below which there is damping (units of det J); the source
-            leaves it to the arm: the arms here have 0.06 to 0.3 at their safe starts.
+            leaves it to the arm: at their safe starts the arms here have 0.02 (the UR3, which is
+            thus hardly ever undamped) to 0.3.
 
     Source: [NakamuraHanafusa1986].
     """

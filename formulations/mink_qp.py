@@ -18,8 +18,9 @@ class MinkQp(DisplacementQp):
     over all tasks i (priorities play no part), poses in the task frame, v in rad/s; W_i is the
     task's weight (mink's cost squared), Jl_i = Jlog6 of a pose task, mu_i = lm_damping dt^2
     ||V_i||^2_(W_i). mink's own gain is 1: a target is to be reached within one step, 1/dt in our
-    terms; here the task's gain stands. With next to no damping velocities are only bounded by the
-    limits near a singularity, and by nothing where none is in force.
+    terms; here the task's gain stands. mink has no acceleration limits; those in force bound v as
+    they do in `pink-qp`. With next to no damping velocities are only bounded by the limits near a
+    singularity, and by nothing where none is in force.
 
     Attributes:
         damping: lambda, unsquared; mink adds lambda^2 = 1e-12.

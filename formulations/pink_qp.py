@@ -18,8 +18,9 @@ class PinkQp(DisplacementQp):
     over all tasks i (priorities play no part), poses in the task frame, v in rad/s; W_i is the
     task's weight (Pink's cost squared), Jl_i = Jlog6 of a pose task, mu_i = lm_damping dt^2
     ||V_i||^2_(W_i). Pink's own gain is 1: a target is to be reached within one step, 1/dt in our
-    terms; here the task's gain stands. With next to no damping velocities are only bounded by the
-    limits near a singularity, and by nothing where none is in force.
+    terms; here the task's gain stands. Acceleration limits in force bound v as well, with Pink's
+    braking bound sqrt(2 a d) (see `DisplacementQp`). With next to no damping velocities are only
+    bounded by the limits near a singularity, and by nothing where none is in force.
 
     Attributes:
         damping: lambda, unsquared; Pink adds lambda^2 = 1e-12.

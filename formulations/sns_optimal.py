@@ -24,11 +24,12 @@ class OptimalSaturationInNullSpace:
         min_v 1/2 ||v||^2   s.t.   J v = s V,   lo <= v <= hi,
         mu = T^T v,   T_j = dv/d(bound_j),   mu_j <= 0 at hi,   mu_j >= 0 at lo
 
-    Where s = 1 fits, the velocity is the least one that does the task. The multipliers are those
-    of the norm, not of s: where the task has to be scaled it comes nearer to the largest s than
-    `sns` in some states and less near in others. J (m, nv) and V (m,) are each priority level's,
-    poses in the task frame; v in rad/s. Strict priority, bounds active or not; `Infeasible` where
-    no s fits. Weights play no part.
+    (below the first level v - v_(k-1) takes the place of v in the norm and in mu). Where s = 1
+    fits, the velocity is the least one that does the task. The multipliers are those of the norm,
+    not of s: where the task has to be scaled it comes nearer to the largest s than `sns` in some
+    states and less near in others. J (m, nv) and V (m,) are each priority level's, poses in the
+    task frame; v in rad/s. Strict priority, bounds active or not; `Infeasible` where no s fits.
+    Weights play no part.
 
     Attributes:
         braking: how the box approaches a position limit (see `dikbench.box`).

@@ -31,7 +31,7 @@ class WeightedLeastNorm:
         damping: lambda, unsquared (units of J); 0 by default: the task exactly.
         rank_tolerance: singular values of J W^-1/2 up to this count as zero (absolute, units of J).
 
-    Source: [ChanDubey1995].
+    Source: [ChanDubey1995], which weighs a joint at rest too: at its limit that would lock it.
     """
 
     damping: float = 0.0

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from dikbench.array import Array, Indices
+from dikbench.array import Array
 from dikbench.constraints.constraint import unit_rows
 from dikbench.errors import DikbenchError
 from dikbench.kinematics import Kinematics
@@ -22,9 +22,9 @@ class TorqueConstraint:
         tau = M(q) (v - v_prev)/dt + b(q, v_prev),   tau_min <= tau <= tau_max
 
     with M the mass matrix and b gravity, centrifugal and Coriolis torques at the start of the step:
-    what the joints must exert to change the velocity from v_prev to v within it. Two rows per joint
-    that has finite effort limits, [N m or N] before they are scaled. An unknown v_prev counts as
-    rest.
+    what the joints must exert to change the velocity from v_prev to v within it. A row per finite
+    effort limit, the upper ones first, [N m or N] before they are scaled. An unknown v_prev counts
+    as rest.
 
     Source: R. Featherstone, Rigid Body Dynamics Algorithms, Springer 2008 (equation of motion).
     """
@@ -38,15 +38,15 @@ class TorqueConstraint:
             DikbenchError: if the robot has no effort limits in force.
         """
         robot, q = kinematics.robot, kinematics.q
-        limit, bounded = effort_limits(robot)
+        limit = effort_limits(robot)
+        above, below = np.isfinite(limit.upper), np.isfinite(limit.lower)
         rest = np.zeros(robot.nv)
         before = rest if v_prev is None else v_prev
         M = mass_matrix(robot, q)
         # What the torque is at v = 0: the step that stops the robot.
         stop = pin.rnea(robot.model, robot.scratch, q, before, -before / dt)
-        rows = M[bounded] / dt
-        G = np.vstack([rows, -rows])
-        h = np.concatenate([(limit.upper - stop)[bounded], (stop - limit.lower)[bounded]])
+        G = np.vstack([M[above], -M[below]]) / dt
+        h = np.concatenate([(limit.upper - stop)[above], (stop - limit.lower)[below]])
         return unit_rows(G, h)
 
     def torques(self, robot: Robot, q: Array, v: Array, v_prev: Array, dt: float) -> Array:
@@ -70,17 +70,15 @@ class TorqueConstraint:
         return np.array(found).reshape(len(found), robot.nv)
 
 
-def effort_limits(robot: Robot) -> tuple[Interval, Indices]:
-    """The effort limits and the joints (indices into v) that have finite ones.
+def effort_limits(robot: Robot) -> Interval:
+    """The effort limits in force, at least one of which is finite.
 
     Raises:
         DikbenchError: if there are none.
     """
     limit = robot.limits.effort
-    if limit is not None:
-        bounded = np.flatnonzero(np.isfinite(limit.lower) & np.isfinite(limit.upper))
-        if len(bounded):
-            return limit, bounded
+    if limit is not None and np.isfinite([limit.lower, limit.upper]).any():
+        return limit
     raise DikbenchError(
         f"robot {robot.name}: a torque constraint needs effort limits; none are in force "
         "(Robot.with_limits(effort=...) sets them)"

@@ -12,7 +12,7 @@ from dikbench.array import Array
 from dikbench.errors import DikbenchError
 from dikbench.kinematics import Kinematics
 from dikbench.robot import Robot, frame_id
-from dikbench.tasks.task import LinearizedTask
+from dikbench.tasks.task import LinearizedTask, check_weight
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +57,7 @@ class OrientationTask:
         robot = kinematics.robot
         index = robot.frame_id if self.frame is None else frame_id(robot.model, self.frame)
         rows = np.array(self.rows(robot))
+        check_weight("orientation task", self.weight, len(rows))
         relative = kinematics.placement(index).rotation.T.dot(
             _rotation(self.target if target is None else target)
         )

@@ -12,7 +12,7 @@ from dikbench.array import Array
 from dikbench.errors import DikbenchError
 from dikbench.kinematics import Kinematics
 from dikbench.robot import Robot, frame_id
-from dikbench.tasks.task import LinearizedTask
+from dikbench.tasks.task import LinearizedTask, check_weight
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,10 +59,13 @@ class PositionTask:
         index = robot.frame_id if self.frame is None else frame_id(robot.model, self.frame)
         X = kinematics.placement(index)
         rows = np.array(self.rows(robot))
+        check_weight("position task", self.weight, len(rows))
         goal = self.target if target is None else target
         error: Array = X.rotation.T.dot(_point(goal) - X.translation)
         V = self.gain * error
         if velocity is not None:
+            if not isinstance(goal, pin.SE3):
+                raise DikbenchError("position task: the twist of a target needs its pinocchio.SE3")
             V += X.rotation.T.dot(goal.rotation.dot(velocity.linear))
         J = kinematics.jacobian(index)
         return LinearizedTask(J[rows], V[rows], error[rows], self.weight, self.priority)

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from dikbench import load_robot
 from dikbench.array import Array
+from dikbench.contract_states import SINGULAR
 from dikbench.kinematics import Kinematics
-from dikbench.linear_algebra import DampedInverse, pseudo_inverse
+from dikbench.linear_algebra import DampedInverse, damped_least_squares, pseudo_inverse
 
 
 def random_matrix(seed: int, m: int, n: int, rank: int) -> Array:
@@ -87,3 +88,37 @@ def test_nothing_left_free_gives_nothing() -> None:
     inverse = DampedInverse(np.zeros((2, 3)), 0.0, 0.0)
     np.testing.assert_array_equal(inverse.times(np.ones(2)), np.zeros(3))
     np.testing.assert_array_equal(inverse.taken("damped"), np.zeros((3, 3)))
+
+
+@given(**SHAPES, exponent=st.floats(1, 10))
+@settings(deadline=None, max_examples=200)
+def test_least_squares_are_exact_however_little_they_are_damped(
+    seed: int, m: int, n: int, lost: int, exponent: float
+) -> None:
+    """At any rank the damped solution is that of the singular values, undamped the shortest one."""
+    A = random_matrix(seed, m, n, max(min(m, n) - lost, 0))
+    b = np.random.default_rng(seed).normal(size=m)
+    U, singular, Vt = np.linalg.svd(A, full_matrices=False)
+    kept = singular > 1e-9
+    for damping in (0.0, 10.0**-exponent):
+        gain = np.divide(
+            singular, singular**2 + damping**2, out=np.zeros_like(singular), where=kept
+        )
+        x = damped_least_squares(A, b, damping**2)
+        np.testing.assert_allclose(x, Vt.T @ (gain * (U.T @ b)), rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "q"), [(name, q) for name, places in SINGULAR.items() for q in places], ids=str
+)
+def test_undamped_least_squares_are_shortest_at_singular_postures(
+    name: str, q: tuple[float, ...]
+) -> None:
+    """Where rank is lost up to rounding, as on a real arm, they are the pseudo-inverse's."""
+    robot = load_robot(name)
+    kinematics = Kinematics(robot)
+    kinematics.update(np.array(q, dtype=float))
+    J = kinematics.jacobian(robot.frame_id)[list(robot.task_rows)]
+    V = np.linspace(0.3, -0.2, len(J))
+    expected = pseudo_inverse(J, 1e-9) @ V
+    np.testing.assert_allclose(damped_least_squares(J, V, 0.0), expected, rtol=0, atol=1e-12)

@@ -135,3 +135,10 @@ def test_a_wrong_target_is_one_line(
     robot = load_robot("planar3r")
     with pytest.raises(DikbenchError, match=r"or a pinocchio\.SE3, got"):
         kind(target=wrong).linearize(_at(robot, robot.q0))
+
+
+def test_the_twist_of_a_point_is_an_error_of_one_line() -> None:
+    """A body twist is in the axes of a placement, which a point does not have."""
+    kinematics = _at(load_robot("panda"), load_robot("panda").q0)
+    with pytest.raises(DikbenchError, match="the twist of a target needs its pinocchio"):
+        PositionTask().linearize(kinematics, np.zeros(3), pin.Motion.Zero())

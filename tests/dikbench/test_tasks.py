@@ -22,7 +22,9 @@ from dikbench.tasks import (
     CentreOfMassTask,
     DampingTask,
     LinearizedTask,
+    OrientationTask,
     PoseTask,
+    PositionTask,
     PostureTask,
     Task,
 )
@@ -368,11 +370,13 @@ def _weighted(kind: str, robot: Robot, weight: object) -> LinearizedTask:
             _placement(robot, robot.q0),
             weight=weight,  # type: ignore[arg-type]
         ),
+        "position": lambda: PositionTask(np.ones(3), weight=weight),  # type: ignore[arg-type]
+        "orientation": lambda: OrientationTask(np.eye(3), weight=weight),  # type: ignore[arg-type]
     }[kind]()
     return task.linearize(_at(robot, robot.q0 + 0.2))
 
 
-KINDS = {"posture": 7, "damping": 7, "centre": 3, "pose": 6}
+KINDS = {"posture": 7, "damping": 7, "centre": 3, "pose": 6, "position": 3, "orientation": 3}
 
 
 @pytest.mark.parametrize("kind", KINDS)

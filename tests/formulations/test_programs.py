@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from dikbench.array import Array
-from dikbench.errors import DikbenchError, Infeasible
+from dikbench.contract_states import SINGULAR
+from dikbench.errors import DikbenchError, Infeasible, SolverFailed
 from dikbench.kinematics import Kinematics
 from dikbench.linear_algebra import null_space
 from dikbench.problem import DikProblem, program_of
@@ -21,7 +22,7 @@ from dikbench.robot import Robot
 from dikbench.robot_catalogue import load_robot
 from dikbench.solvers.catalogue import parse_solver
 from dikbench.solvers.checked import make_solve
-from dikbench.tasks import LinearizedTask, PositionTask, PostureTask
+from dikbench.tasks import LinearizedTask, OrientationTask, PositionTask, PostureTask
 from formulations.lp_alpha_components import twist_from_rates
 from formulations.lu_kernel import lu_kernel
 from formulations.manipulability import manipulability_gradient
@@ -115,6 +116,25 @@ def test_the_weighted_program_tends_to_the_hierarchy() -> None:
 # --- programs without limits, and with velocity limits only
 
 
+def test_three_levels_are_answered_where_bounds_bind() -> None:
+    """Position, orientation and posture of a fast hand, a level hardly damped in between."""
+    answered = 0
+    for problem in _problems(60, 1.5):
+        hand, posture = problem.tasks
+        position = LinearizedTask(hand.J[:3], hand.V[:3], np.zeros(3))
+        orientation = LinearizedTask(hand.J[3:], hand.V[3:], np.zeros(3), priority=2)
+        posture.priority = 3
+        problem.tasks[:] = [position, orientation, posture]
+        try:
+            v = _velocity("hqp", problem)
+        except SolverFailed:
+            continue
+        answered += 1
+        box = problem.box()
+        assert np.all((box.lower - 1e-9 <= v) & (v <= box.upper + 1e-9))
+    assert answered >= 58
+
+
 def test_least_squares_in_velocity_limits_is_damped_least_squares_where_none_binds() -> None:
     """And elsewhere stays inside them, where clipping would too, with less error."""
     for problem in _problems(30, 0.05, "none"):
@@ -180,6 +200,49 @@ def test_components_keep_axes_that_the_whole_would_slow_down() -> None:
     assert gained > 20
 
 
+def test_components_of_an_orientation_are_roll_pitch_and_yaw() -> None:
+    """Each rate of the frame is a share of the wanted one, and they add up to the most there is."""
+    random = np.random.default_rng(8)
+    held_back = 0
+    for problem in _problems(20, 0.0, "none"):
+        kinematics = Kinematics(problem.robot)
+        kinematics.update(problem.q)
+        R = kinematics.placement(problem.robot.frame_id).rotation
+        target = R @ pin.exp3(random.uniform(-1, 1, 3))
+        task = OrientationTask(target=target, gain=20.0).linearize(kinematics)
+        problem.tasks[:] = [task]
+        v = _velocity("lp-alpha-components[regularization=0]", problem)
+        E = twist_from_rates(R)[3:, 3:]
+        alphas = np.linalg.solve(E, task.J @ v) / np.linalg.solve(E, task.V)
+        common = _alpha(problem, _velocity("lp-alpha[regularization=0]", problem))
+        assert np.all((alphas >= -1e-6) & (alphas <= 1 + 1e-6))
+        assert alphas.sum() >= 3 * common - 1e-6
+        held_back += alphas.min() < 0.99
+    assert held_back > 10
+
+
+def test_components_of_a_position_need_no_rates_of_roll_and_yaw() -> None:
+    """Also where the frame's x axis stands upright, where those of a pose are not defined."""
+    robot = load_robot("panda")
+    kinematics = Kinematics(robot)
+    q = robot.q0.copy()
+    for _ in range(50):  # turn the x axis up
+        kinematics.update(q)
+        R = kinematics.placement(robot.frame_id).rotation
+        axis = np.cross([1.0, 0.0, 0.0], R.T[:, 2])
+        J = kinematics.jacobian(robot.frame_id)
+        q = pin.integrate(robot.model, q, 0.5 * np.linalg.pinv(J[3:], rcond=1e-3) @ axis)
+    kinematics.update(q)
+    R = kinematics.placement(robot.frame_id).rotation
+    with pytest.raises(Infeasible, match="no rates near cos"):
+        twist_from_rates(R)
+    point = kinematics.placement(robot.frame_id).translation + np.array([0.01, -0.02, 0.01])
+    task = PositionTask(target=point).linearize(kinematics)
+    problem = DikProblem(robot, q, None, DT, [task], robot.limits.at(q))
+    v = _velocity("lp-alpha-components", problem)
+    assert task.J @ v == pytest.approx(task.V, abs=1e-6)
+
+
 @given(
     angles=arrays(float, 3, elements=st.floats(-1.4, 1.4)),
     rates=arrays(float, 3, elements=st.floats(-1, 1)),
@@ -199,6 +262,35 @@ def test_upright_there_are_no_rates() -> None:
     """At a pitch of 90 degrees roll and yaw turn about the same axis."""
     with pytest.raises(Infeasible, match="no rates near cos"):
         twist_from_rates(pin.rpy.rpyToMatrix(np.array([0.2, np.pi / 2, 0.4])))
+
+
+# --- Pink's and mink's program
+
+
+@pytest.mark.parametrize("law", ["pink-qp", "mink-qp"])
+def test_a_joint_without_acceleration_limit_at_its_position_limit_has_no_brake(law: str) -> None:
+    """Infinite deceleration over no distance, and none over an infinite one, bound nothing."""
+    robot = load_robot("panda")
+    assert robot.limits.position is not None
+    highest = robot.limits.position.upper.copy()
+    highest[1] = np.inf
+    deceleration = np.array([np.inf, 0.0, 20, 20, 20, 20, 20])
+    robot = robot.with_limits(
+        position=(robot.limits.position.lower, highest),
+        acceleration=(-deceleration, np.full(7, 20.0)),
+    )
+    q = robot.q0.copy()
+    q[0] = highest[0]
+    kinematics = Kinematics(robot)
+    kinematics.update(q)
+    J = kinematics.jacobian(robot.frame_id)
+    wanted = np.array([-0.1, 0.1, 0.1, -0.1, 0.1, -0.1, 0.1])
+    tasks = [LinearizedTask(J, J @ wanted, np.zeros(6))]
+    damped = make_formulation("dls[damping=0.01]")
+    problem = DikProblem(robot, q, None, DT, tasks, robot.limits.at(q))
+    expected = damped.velocity(problem, make_solve(None, None))
+    assert expected[0] < 0
+    assert _velocity(f"{law}[damping=0.01]", problem) == pytest.approx(expected, abs=1e-8)
 
 
 # --- NEO
@@ -258,9 +350,31 @@ def test_manipulability_gradient_is_the_derivative(name: str) -> None:
         assert found == pytest.approx(expected, abs=1e-8)
 
 
+@pytest.mark.parametrize("eps", [1e-2, 1e-5, 1e-8, 1e-11], ids=str)
+def test_manipulability_gradient_near_a_singularity(eps: float) -> None:
+    """On a planar arm w = l_1 l_2 |sin q_2|: next to the stretched arm it rises with q_2."""
+    robot = load_robot("planar3r")
+    kinematics, rows = Kinematics(robot), list(robot.task_rows)
+    kinematics.update(np.array([0.4, eps, 0.7]))
+    found = manipulability_gradient(kinematics.jacobian(robot.frame_id)[rows])
+    kinematics.update(np.array([0.4, np.pi / 2, 0.7]))
+    J = kinematics.jacobian(robot.frame_id)[rows]
+    slope = abs(float(np.linalg.det(J))) * np.cos(eps)  # l_1 l_2 cos q_2
+    assert found == pytest.approx([0, slope, 0], abs=1e-4 * slope)
+
+
 def test_manipulability_has_no_gradient_at_a_singularity() -> None:
-    """Where it is zero."""
+    """Where it is zero, up to rounding too, and where the rows are more than the joints."""
     assert np.array_equal(manipulability_gradient(np.zeros((6, 7))), np.zeros(7))
+    tall = np.random.default_rng(0).normal(size=(6, 5))
+    assert np.array_equal(manipulability_gradient(tall), np.zeros(5))
+    for name, places in SINGULAR.items():
+        robot = load_robot(name)
+        kinematics = Kinematics(robot)
+        for q in places:
+            kinematics.update(np.array(q, dtype=float))
+            J = kinematics.jacobian(robot.frame_id)[list(robot.task_rows)]
+            assert np.array_equal(manipulability_gradient(J), np.zeros(robot.nv))
 
 
 # --- kernels

@@ -64,6 +64,27 @@ def test_slope_of_the_torque_is_the_mass_matrix(name: str) -> None:
     np.testing.assert_allclose(G[: robot.nv], M / np.linalg.norm(M, axis=1, keepdims=True))
 
 
+def test_a_limit_on_one_side_alone_is_a_row() -> None:
+    """The other side of the joint, and joints without any limit, have none."""
+    both = bounded("panda")
+    effort = both.limits.effort
+    assert effort is not None
+    lower, upper = effort.lower.copy(), effort.upper.copy()
+    lower[1], upper[2], lower[3], upper[3] = -np.inf, np.inf, -np.inf, np.inf
+    robot = both.with_limits(effort=(lower, upper))
+    kinematics = Kinematics(robot)
+    kinematics.update(robot.q0)
+    before = np.linspace(-0.5, 0.5, 7)
+    G, h = TorqueConstraint().linearize(kinematics, before, DT)
+    every = Kinematics(both)
+    every.update(both.q0)
+    all_rows, all_bounds = TorqueConstraint().linearize(every, before, DT)
+    kept = np.concatenate([np.isfinite(upper), np.isfinite(lower)])
+    np.testing.assert_array_equal(kept.nonzero()[0], [0, 1, 4, 5, 6, 7, 9, 11, 12, 13])
+    np.testing.assert_allclose(G, all_rows[kept], atol=1e-15)
+    np.testing.assert_allclose(h, all_bounds[kept], atol=1e-12)
+
+
 def test_law_keeps_the_torques_where_it_is_told_to() -> None:
     """A twist that asks for a jump from rest passes the effort limits; with the rows `qp` does not.
 
