@@ -25,7 +25,7 @@ FINEST: Final = 16
 NO_WAY: Final = 1e-9
 """A path, or a step along it, that is shorter than this is a point [m]."""
 
-NEIGHBOURS: Final = 4
+NEIGHBOURS: Final = 3
 """So many of the nearest vertices are looked at to begin with."""
 
 
@@ -60,6 +60,12 @@ class Path:
     def pieces(self) -> Array:
         """Vectors from each vertex to the next, (k, 3) [m]."""
         return np.diff(self.vertices, axis=0)
+
+    @cached_property
+    def squares(self) -> Array:
+        """Square lengths of the pieces, (k,) [m^2]."""
+        lengths: Array = np.einsum("ij,ij->i", self.pieces, self.pieces)
+        return lengths
 
     def distances(self, points: Array) -> Array:
         """Distance of points (n, 3) [m] from the path as a set, (n,) [m]; exact to `CHORD`."""
@@ -101,8 +107,8 @@ class Path:
         """
         away, along = points - self.vertices[pieces], self.pieces[pieces]
         share = np.einsum("...i,...i->...", away, along)
-        share /= np.einsum("...i,...i->...", along, along)
-        share = np.clip(share, 0.0, 1.0)
+        share /= self.squares[pieces]
+        np.clip(share, 0.0, 1.0, out=share)
         away -= share[..., None] * along
         return share, np.einsum("...i,...i->...", away, away)
 
