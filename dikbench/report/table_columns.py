@@ -20,7 +20,7 @@ from dikbench.statistics.problems import ProblemMatrix
 from dikbench.statistics.shifted_mean import shift_near_median, shifted_geometric_mean
 
 NEGLIGIBLE = 1e-6
-"""What is smaller than this [m, rad, rad/s, a share] is as good as nothing when laws are compared."""
+"""What is smaller than this [m, rad, rad/s, a share] is as good as 0 when laws are compared."""
 
 _AVERAGES = (Statistic.GEOMETRIC_MEAN, Statistic.MEAN)
 
