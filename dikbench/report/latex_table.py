@@ -91,7 +91,9 @@ def _cell(column: Column, cell: Cell) -> str:
         return ""
     if column.count:
         return str(int(cell.value))
-    text = f"\\textbf{{{_number(cell.value)}}}" if cell.best else _number(cell.value)
+    text = _number(cell.value)
+    if cell.best:
+        text = f"\\textbf{{\\boldmath{text}}}" if "$" in text else f"\\textbf{{{text}}}"
     if cell.has_interval:
         text += f" {{\\scriptsize[{_number(cell.lower)}, {_number(cell.upper)}]}}"
     return f"\\textcolor{{gray}}{{{text}}}" if cell.unstable else text
