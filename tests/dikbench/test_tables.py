@@ -322,6 +322,20 @@ def test_a_law_that_fails_wins_no_average_over_the_trials_it_survived() -> None:
     assert _best(table, "position_error_rms_m", family="reach") == {"a none"}
 
 
+def test_a_failure_where_nothing_is_measured_does_not_disqualify_the_others() -> None:
+    """A law that fails a scenario without a path leaves the laws beside it to be compared."""
+    trials = _trials(
+        formulation=["a", "a", "b", "b", "c", "c"],
+        scenario=["reach", "step"] * 3,
+        status=["ok", "crashed", "ok", "ok", "ok", "ok"],
+        contour_error_max_m=[0.1, np.nan, 0.2, np.nan, 0.3, np.nan],
+        off_course_max_rad=[0.1, np.nan, 0.2, np.nan, 0.3, np.nan],
+    )
+    table = make_table(TRACKING_ERROR, trials)
+    for key in ("contour_error_max_m_worst", "off_course_max_rad", "off_course_max_rad_worst"):
+        assert _best(table, key) == {"b none"}, key
+
+
 def test_a_law_that_was_skipped_somewhere_is_not_compared_overall() -> None:
     """An average over the easier scenarios is no win either; nor is the oracle's."""
     trials = _trials(
