@@ -112,7 +112,8 @@ def test_latex_marks_the_best_intervals_and_what_is_unstable() -> None:
         in text
     )
     assert text.count(r"\begin{tabular}") == text.count(r"\end{tabular}") == 1
-    assert to_latex_per_family(PLAIN).startswith(r"\paragraph{reach}")
+    assert r"\shortstack[r]{failure rate} & " in text
+    assert to_latex_per_family(PLAIN).startswith(r"\noindent\textbf{reach}")
 
 
 def test_csv_holds_plain_numbers_their_bounds_and_shifts() -> None:
@@ -178,6 +179,16 @@ def test_hostile_names_in_a_plain_markdown_table() -> None:
     """The table of return codes escapes them too."""
     text = markdown_rows(pd.DataFrame({"solver": ["<b>|*x*"], "right": [0.25]}))
     assert "| &lt;b&gt;\\|\\*x\\* |  0.25 |" in text
+
+
+def test_hostile_names_stay_text_in_latex() -> None:
+    """As many cells to a row as without them; no name is taken for an argument of a line's end."""
+    text = to_latex(HARMFUL)
+    rows = [line for line in text.splitlines() if line.endswith(r"& 0 & 0 & 8 & 1 & 2 \\")]
+    assert len(rows) == len(HOSTILE)
+    assert {len(re.split(r"(?<!\\)&", row)) for row in rows} == {2 + len(COLUMNS)}
+    assert not re.search(r"\\\\\s*\[", text)
+    assert "{[}first{]}" in text
 
 
 def _groups_balance(text: str) -> bool:
