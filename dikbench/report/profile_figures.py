@@ -154,8 +154,8 @@ def _data(errors: dict[str, Costs], target: Path) -> Figure:
     for axis, (name, costs) in zip(axes.flat, errors.items(), strict=False):
         order = [costs.laws.index(law) if law in costs.laws else -1 for law in ranked]
         _curves(axis, costs.laws, order, TARGETS, shares[name])
-        logarithmic(axis, "x")
         axis.set_xlim(TARGETS[0], TARGETS[-1])
+        logarithmic(axis, "x")
         axis.set_ylim(-0.02, 1.02)
         axis.set_title(f"{name}, {len(costs.errors)} problems")
         axis.set_xlabel(f"target: {costs.words} [m]")
@@ -191,8 +191,8 @@ def _small(figure: Any, places: Any) -> Iterator[Any]:
 
 
 def _factor_axis(axis: Any) -> None:
-    logarithmic(axis, "x")
     axis.set_xlim(0.93, LARGEST)  # the share at 1 is to be seen
+    logarithmic(axis, "x")
     axis.set_ylim(-0.02, 1.02)
 
 
