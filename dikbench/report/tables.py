@@ -21,6 +21,11 @@ HOW = ["plant", "reference"]
 _Setting = tuple[str | None, str | None]
 
 
+def family(scenario: str) -> str:
+    """The family of a scenario's selector."""
+    return parse_selector(scenario).name
+
+
 def make_table(kind: TableKind, trials: pd.DataFrame) -> Table:
     """A table, overall and per family; plants and reference modes are never pooled.
 
@@ -46,7 +51,7 @@ def make_table(kind: TableKind, trials: pd.DataFrame) -> Table:
 
 def _derived(rows: pd.DataFrame) -> pd.DataFrame:
     """Rows with their family, and with what is counted as columns of zeros and ones."""
-    families = {name: parse_selector(name).name for name in rows["scenario"].unique()}
+    families = {name: family(name) for name in rows["scenario"].unique()}
     timed = rows["law_time_median_us"].notna()
     return rows.assign(
         family=rows["scenario"].map(families),
