@@ -140,7 +140,7 @@ LIMIT_VIOLATION = TableKind(
         _worst("position_violation_max_rad", "position worst [rad]"),
         _worst("velocity_violation_max_rad_s", "velocity worst [rad/s]"),
         _worst("acceleration_violation_max_rad_s2", "acceleration worst [rad/s^2]"),
-        _worst("position_violation_integral_rad_s", "position integral worst [rad s]"),
+        _worst("position_violation_integral_rad_s", "position integral worst [rad*s]"),
         _worst("velocity_violation_integral_rad", "velocity integral worst [rad]"),
         _worst("acceleration_violation_integral_rad_s", "acceleration integral worst [rad/s]"),
         _worst("violating_share", "violating share worst"),
