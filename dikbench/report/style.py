@@ -84,7 +84,7 @@ def law_name(formulation: str, solver: str) -> str:
 
 
 def short(name: str, most: int = LONGEST_NAME) -> str:
-    """A name that fits: characters that cannot be written replaced, a long one cut in its middle."""
+    """A name that fits: what cannot be written is replaced, a long one cut in its middle."""
     written = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in name)
     if len(written) <= most:
         return written
