@@ -24,7 +24,7 @@ def draw_error_and_time(ran: pd.DataFrame, target: Path) -> list[Figure]:
     table = cost_points(rows)
     if table.empty:
         return []
-    column, name = error_column(rows)
+    _, name = error_column(rows)
     figure, axis = plt.subplots(figsize=(WIDTH, 4.6))
     solving = table["solver"].ne("none")
     for group, colour, label in (

@@ -27,9 +27,12 @@ def draw_joint_margins(
 ) -> list[Figure]:
     """Draw the margins of the study's example, or of the first scenario that is about them."""
     scenario = _about_limits([example, *dict.fromkeys(ran["scenario"])])
-    motions = stored_motions(folder, ran, scenario) if scenario else {}
+    if scenario is None:
+        return []
+    motions = stored_motions(folder, ran, scenario)
     margins = {name: joint_margin(motion) for name, motion in motions.items()}
     margins = {name: margin for name, margin in margins.items() if np.isfinite(margin).any()}
+    margins = dict(sorted(margins.items(), key=lambda item: -np.nanmin(item[1])))
     if not margins:
         return []
     panels = in_panels(list(margins))
@@ -61,8 +64,8 @@ def draw_joint_margins(
     figure.supylabel("margin to the nearest joint limit [rad]", fontsize=8)
     caption = (
         f"Distance of the joint nearest to one of its position limits from it: {scenario}, "
-        f"{how(one_way(ran[ran['scenario'].eq(scenario)]))}, one solver per law, from the best law "
-        "to the worst by its error. Below 0, shaded, a joint is outside."
+        f"{how(one_way(ran[ran['scenario'].eq(scenario)]))}, one solver per law, those that "
+        "keep farthest away first. Below 0, shaded, a joint is outside."
     )
     file = save(figure, target, "joint_margins_against_time")
     return [Figure(file, caption, "Margin to the joint limits against time")]
@@ -86,5 +89,7 @@ def _about_limits(scenarios: list[str]) -> str | None:
     families = {scenario: parse_selector(scenario).name for scenario in scenarios}
     if families[scenarios[0]] in FAMILIES:
         return scenarios[0]
-    ranked = [(FAMILIES.index(f), n, s) for n, (s, f) in enumerate(families.items()) if f in FAMILIES]
+    ranked = [
+        (FAMILIES.index(f), n, s) for n, (s, f) in enumerate(families.items()) if f in FAMILIES
+    ]
     return min(ranked)[2] if ranked else None

@@ -8,8 +8,9 @@ from typing import Any, Final
 import numpy as np
 
 from dikbench.array import Array
+from dikbench.report.style import lay_out
 
-RADII: Final = (5.0, 9.0, 14.0, 20.0, 28.0, 38.0, 50.0)
+RADII: Final = (5.5, 9.0, 14.0, 20.0, 28.0, 38.0, 50.0)
 """Distances from the point at which room is looked for [pt], ..."""
 
 ANGLES: Final = (0, 180, 45, -45, 135, -135, 90, -90, 20, -20, 160, -160, 68, -68, 112, -112)
@@ -20,17 +21,17 @@ LEADER: Final = 8.0
 
 
 def label_points(
-    axis: Any, points: Array, names: Sequence[str], colours: Sequence[str], size: float = 6.0
+    axis: Any, points: Array, names: Sequence[str], colours: Sequence[str], size: float = 6.5
 ) -> list[str]:
     """Write the names of points (k, 2) beside them, those in the thick of it first.
 
-    The figure must have its final limits.
+    Everything else in the figure must be there already: it is laid out.
 
     Returns:
         The names for which there was no room; they are left out.
     """
     figure = axis.figure
-    figure.draw_without_rendering()
+    lay_out(figure)
     pixel = figure.dpi / 72.0
     places = axis.transData.transform(points) / pixel
     frame = np.array(axis.get_window_extent().extents) / pixel
@@ -41,9 +42,10 @@ def label_points(
     for index in np.argsort(crowding, kind="stable"):
         text = axis.annotate(
             names[index], points[index], xytext=(0, 0), textcoords="offset points", fontsize=size,
-            color=colours[index], ha="center", va="center", in_layout=False,
+            color=colours[index], ha="center", va="center", in_layout=False, zorder=2,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.3},
         )  # fmt: skip
-        extent = text.get_window_extent().extents / pixel
+        extent = text.get_window_extent().extents / pixel  # its box is not in it
         half = np.array([extent[2] - extent[0], extent[3] - extent[1]]) / 2.0
         offset = _room(places[index], half, taken, frame)
         if offset is None:
@@ -57,7 +59,7 @@ def label_points(
         if np.linalg.norm(nearest) > LEADER:
             axis.annotate(
                 "", points[index], xytext=tuple(nearest), textcoords="offset points",
-                in_layout=False,
+                in_layout=False, zorder=2,
                 arrowprops={
                     "arrowstyle": "-", "color": "0.6", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2
                 },

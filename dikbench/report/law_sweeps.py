@@ -45,8 +45,8 @@ def law_sweeps(ran: pd.DataFrame) -> list[LawSweep]:
         for parameter, text in selector.parameters.items():
             value = number(text)
             if value is not None:
-                others = (f"{k}={v}" for k, v in selector.parameters.items() if k != parameter)
-                key = (selector.name, parameter, ",".join(others))
+                rest = (f"{k}={v}" for k, v in selector.parameters.items() if k != parameter)
+                key = (selector.name, parameter, ",".join(rest))
                 groups.setdefault(key, {})[formulation] = value
     found = []
     for (law, parameter, others), values in groups.items():
@@ -69,17 +69,17 @@ def draw_law_sweeps(ran: pd.DataFrame, target: Path) -> list[Figure]:
         file = file_name("law", sweep.law, sweep.parameter, place)
         caption = (
             f"{sweep.law}{f' ({sweep.others})' if sweep.others else ''} against its "
-            f"{sweep.parameter}, {how(sweep.rows)}: medians over the scenarios of each family of "
-            f"the rms {name}, of the peak speed and of the share of the steps that pass a limit; "
-            "failed trials count as infinite and leave a gap."
+            f"{sweep.parameter}, {how(sweep.rows)}: the median rms {name}, the largest peak "
+            "speed and the largest share of steps that pass a limit, over the scenarios of each "
+            "family; a failed trial counts as infinite, and infinity leaves a gap."
         )
         title = f"{sweep.law} against its {sweep.parameter}"
         figures.append(Figure(_draw(sweep, target, file), caption, title))
     return figures
 
 
-def medians(sweep: LawSweep) -> pd.DataFrame:
-    """Medians per family and value: `error` [mm], `peak` over the limit, `violating` [%]."""
+def per_family(sweep: LawSweep) -> pd.DataFrame:
+    """Per family and value the median `error` [mm], the worst `peak` speed and `violating` [%]."""
     column, _ = error_column(sweep.rows)
     rows = sweep.rows
     table = pd.DataFrame(
@@ -91,17 +91,19 @@ def medians(sweep: LawSweep) -> pd.DataFrame:
             "violating": 100.0 * with_failures(rows, "violating_share"),
         }
     )
-    return table.groupby(["family", "value"], sort=False).median().sort_index(level="value")
+    groups = table.groupby(["family", "value"], sort=False)
+    taken = groups.agg({"error": "median", "peak": "max", "violating": "max"})
+    return taken.sort_index(level="value")
 
 
 def _draw(sweep: LawSweep, target: Path, file: str) -> str:
     _, name = error_column(sweep.rows)
     quantities = {
-        "error": f"rms {name} [mm]",
-        "peak": "peak speed over limit",
-        "violating": "steps that pass a limit [%]",
+        "error": f"rms {name} [mm],\nmedian",
+        "peak": "peak speed over limit,\nworst",
+        "violating": "steps that pass a limit [%],\nworst",
     }
-    table, scale = medians(sweep), ValueScale(sweep.rows["value"])
+    table, scale = per_family(sweep), ValueScale(sweep.rows["value"])
     table["error"] = table["error"].clip(lower=1e3 * LEAST_ERROR)
     finite = table.where(table < float("inf"))
     panels = in_panels(list(dict.fromkeys(sweep.rows["family"])))
@@ -116,17 +118,15 @@ def _draw(sweep: LawSweep, target: Path, file: str) -> str:
     for line, families in zip(axes, panels, strict=True):
         for axis, quantity in zip(line, quantities, strict=True):
             for place, kind in enumerate(families):
-                _curve(axis, scale, finite.loc[kind, quantity], short(kind, 22), place)
+                _curve(axis, scale, finite.loc[kind][quantity], short(kind, 22), place)
         line[1].axhline(1.0, color="0.4", linewidth=0.7, zorder=1)
         line[-1].legend(loc="center left", bbox_to_anchor=(1.02, 0.5))
     for axis, label in zip(axes[0], quantities.values(), strict=True):
         axis.set_title(label)
-    for line in axes:
-        logarithmic(line[0], "y")
-        logarithmic(line[1], "y")
+    logarithmic(axes[0, 0], "y")
+    logarithmic(axes[0, 1], "y")
     axes[0, 2].set_ylim(-4, 104)
-    for axis in axes.flat:
-        scale.label(axis)
+    scale.label(list(axes.flat))
     figure.supxlabel(f"{short(sweep.parameter)} of {short(sweep.law)}", fontsize=8)
     return save(figure, target, file)
 

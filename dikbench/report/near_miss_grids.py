@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -31,15 +32,16 @@ class NearMissGrid:
     speeds: tuple[float, ...]
     rows: pd.DataFrame
 
-    def values(self, column: str) -> dict[str, Array]:
-        """A column over the grid, (speeds, misses), per formulation: its median over seeds.
+    def values(self, column: str, over_seeds: Literal["median", "max"]) -> dict[str, Array]:
+        """A column over the grid, (speeds, misses), per formulation.
 
         NaN where there was no trial, or none gave a number.
         """
-        medians = self.rows.groupby(["formulation", "speed", "miss"], sort=False)[column].median()
+        cells = self.rows.groupby(["formulation", "speed", "miss"], sort=False)[column]
+        taken = cells.agg(over_seeds)
         return {
             str(name): (
-                medians.loc[name]
+                taken.loc[name]
                 .unstack("miss")
                 .reindex(index=list(self.speeds), columns=list(self.misses))
                 .to_numpy(dtype=float)
@@ -57,12 +59,14 @@ def near_miss_grids(ran: pd.DataFrame) -> list[NearMissGrid]:
         miss = number(selector.parameters.get("miss", ""))
         speed = number(selector.parameters.get("speed", ""))
         if selector.name == FAMILY and miss is not None and speed is not None:
-            others = {k: v for k, v in selector.parameters.items() if k not in {"miss", "speed"}}
-            key = ",".join(f"{name}={value}" for name, value in others.items())
+            rest = {k: v for k, v in selector.parameters.items() if k not in {"miss", "speed"}}
+            key = ",".join(f"{name}={value}" for name, value in rest.items())
             groups.setdefault(key, {})[scenario] = (miss, speed)
     found = []
     for others, cells in groups.items():
-        misses, speeds = (tuple(sorted(set(values))) for values in zip(*cells.values(), strict=True))
+        misses, speeds = (
+            tuple(sorted(set(values))) for values in zip(*cells.values(), strict=True)
+        )
         if min(len(misses), len(speeds)) >= 2:
             rows = chosen[chosen["scenario"].isin(cells)]
             place = np.array([cells[scenario] for scenario in rows["scenario"]])

@@ -78,7 +78,7 @@ def _draw(axis: Any, table: pd.DataFrame) -> None:
     best = best.sort_values(["slow_down", "off_course"], ascending=[True, False])
     axis.plot(
         best["slow_down"], best["off_course"], color="0.6", drawstyle="steps-post",
-        label="no law is better in both", zorder=1,
+        label="none that keeps the limits is better in both", zorder=1,
     )  # fmt: skip
     axis.scatter(
         keeping["slow_down"], keeping["off_course"], s=18, color=COLOURS[0],

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,25 +13,23 @@ from matplotlib import colormaps
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, LogNorm, Normalize, to_rgb
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from dikbench.array import Array
+from dikbench.array import Array, Mask
 from dikbench.oracle import ORACLE
 from dikbench.report.figure import Figure
 from dikbench.report.near_miss_grids import NearMissGrid, near_miss_grids
 from dikbench.report.outcomes import OFF_COURSE, OUTCOMES, SLOW, outcomes
-from dikbench.report.panels import small_multiples
+from dikbench.report.panels import place_at_top, small_multiples
 from dikbench.report.rows import error_column, how, pages, with_failures
-from dikbench.report.style import save
+from dikbench.report.style import label_decades, save
 
 PER_PAGE = 20
 """Laws in one figure."""
 
-GAP = 0.3
+GAP = 0.18
 """Between the column of miss = 0, which is a case of its own, and the others [cells]."""
 
 FAILED = "#222222"
-NO_TRIAL = "#ececec"
 
 OUTCOME_COLOURS = ("#e8f1e4", "#56B4E9", "#E69F00", "#D55E00", FAILED)
 OUTCOME_MARKS = ("", "s", "o", "v", "x")
@@ -39,7 +37,10 @@ OUTCOME_MARKS = ("", "s", "o", "v", "x")
 
 @dataclass(frozen=True, eq=False)
 class _Map:
-    """A quantity over a grid: its values per law, how they are coloured and written."""
+    """A quantity over a grid: its values per law, how they are coloured and written.
+
+    Without the label of a colour bar it is of categories.
+    """
 
     name: str
     title: str
@@ -47,19 +48,14 @@ class _Map:
     values: Mapping[str, Array]
     colours: Colormap
     norm: Normalize
-    bar: str
-    extend: str = "neither"
-
-    def text(self, value: float) -> str:
-        if self.name == "outcome":
-            return OUTCOME_MARKS[round(value)]
-        return three_digits(value)
+    text: Callable[[float], str]
+    bar: str = ""
 
 
 def draw_phase_diagrams(ran: pd.DataFrame, target: Path) -> list[Figure]:
     """Draw, for each grid of near misses, the error, the peak speed and the outcome per law."""
     figures = []
-    for number, grid in enumerate(near_miss_grids(ran), start=1):
+    for number, grid in enumerate(near_miss_grids(ran.assign(outcome=outcomes(ran))), start=1):
         maps = [m for m in _maps(grid) if any(np.isfinite(v).any() for v in m.values.values())]
         parts = pages(_laws_in_order(grid.rows), PER_PAGE)
         for one in maps:
@@ -71,7 +67,9 @@ def draw_phase_diagrams(ran: pd.DataFrame, target: Path) -> list[Figure]:
                     "a panel per law: the oracle, which moves along the path as asked for, then "
                     f"from the best law to the worst{of}. Black: the trial failed."
                 )
-                title = f"Phase diagram of near misses, {grid.others or 'defaults'}: {one.title}{of}"
+                title = (
+                    f"Phase diagram of near misses, {grid.others or 'defaults'}: {one.title}{of}"
+                )
                 figures.append(Figure(_draw(grid, laws, one, target, file), caption, title))
     return figures
 
@@ -79,7 +77,7 @@ def draw_phase_diagrams(ran: pd.DataFrame, target: Path) -> list[Figure]:
 def _laws_in_order(rows: pd.DataFrame) -> list[str]:
     """The oracle first, then by the mean outcome, then by the median error."""
     column, _ = error_column(rows)
-    worth = rows.assign(outcome=outcomes(rows), error=with_failures(rows, column))
+    worth = rows.assign(error=with_failures(rows, column))
     by_law = worth.groupby("formulation", sort=False)
     table = pd.DataFrame({"outcome": by_law["outcome"].mean(), "error": by_law["error"].median()})
     order = table.sort_values(["outcome", "error"], kind="stable").index
@@ -92,10 +90,9 @@ def _maps(grid: NearMissGrid) -> list[_Map]:
     rows = grid.rows.assign(
         error_mm=1e3 * grid.rows[column].where(ended),
         peak=grid.rows["velocity_peak_ratio"].where(ended),
-        outcome=outcomes(grid.rows).astype(float),
     )
-    shown = NearMissGrid(grid.others, grid.misses, grid.speeds, rows)
-    errors, peaks = shown.values("error_mm"), shown.values("peak")
+    shown = replace(grid, rows=rows)
+    errors, peaks = shown.values("error_mm", "median"), shown.values("peak", "median")
     over = colormaps["YlOrRd"].with_extremes(under="#d5e3ee")
     return [
         _Map(
@@ -105,8 +102,8 @@ def _maps(grid: NearMissGrid) -> list[_Map]:
             errors,
             colormaps["viridis_r"],
             _log_norm(errors, 1e-2, 1e3),
+            three_digits,
             f"rms {name} [mm]",
-            "both",
         ),
         _Map(
             "peak_speed",
@@ -115,19 +112,19 @@ def _maps(grid: NearMissGrid) -> list[_Map]:
             peaks,
             over,
             _log_norm(peaks, 1.01, 1e2, least=1.01),
+            three_digits,
             "largest joint speed over its limit",
-            "both",
         ),
         _Map(
             "outcome",
             "outcome",
-            "What became of the trial, the worst that applies: failed; violating a limit; off "
+            "What became of the trial, the worst of its seeds and that applies: failed; violating a limit; off "
             f"course (more than {np.degrees(OFF_COURSE):.0f} deg from the wanted direction at some "
             f"step); slow (less than {100 * SLOW:.0f} % of the wanted motion at some step); ok.",
-            shown.values("outcome"),
+            shown.values("outcome", "max"),
             ListedColormap(list(OUTCOME_COLOURS)),
             BoundaryNorm(np.arange(-0.5, len(OUTCOMES)), len(OUTCOMES)),
-            "",
+            lambda value: OUTCOME_MARKS[round(value)],
         ),
     ]
 
@@ -144,27 +141,31 @@ def _log_norm(values: Mapping[str, Array], low: float, high: float, least: float
 def _draw(grid: NearMissGrid, laws: Sequence[str], one: _Map, target: Path, file: str) -> str:
     edges, centres = _columns(grid.misses)
     rows = len(grid.speeds)
-    figure, axes = small_multiples(laws, height=0.42 + 0.2 * max(rows, 3))
-    failed = grid.rows.assign(failed=grid.rows["status"].ne("ok").astype(float))
-    failures = NearMissGrid(grid.others, grid.misses, grid.speeds, failed).values("failed")
+    figure, axes = small_multiples(
+        laws,
+        0.2 * max(rows, 3),
+        "miss distance [m; rad]",
+        "speed past the singularity [rad/s; m/s]",
+        top=0.68 if one.bar else 0.5,
+    )
+    outcome = grid.values("outcome", "max")
     for axis, law in zip(axes, laws, strict=True):
         axis.grid(visible=False)
         axis.set_facecolor("white")
         for side in ("left", "bottom"):
             axis.spines[side].set_visible(False)
-        _cells(axis, edges, np.full((rows, len(centres)), 0.0), ListedColormap([NO_TRIAL]))
-        _cells(axis, edges, one.values[law], one.colours, one.norm)
-        broken = np.where(failures[law] > 0.5, 1.0, np.nan)
-        _cells(axis, edges, broken, ListedColormap([FAILED]))
-        _write(axis, centres, one, one.values[law], broken)
+        values = one.values[law]
+        failed = np.isnan(values) & (outcome[law] == OUTCOMES.index("failed"))
+        _cells(axis, edges, values, one.colours, one.norm)
+        if failed.any():
+            _cells(axis, edges, np.where(failed, 1.0, np.nan), ListedColormap([FAILED]))
+        _write(axis, centres, one, values, failed)
         axis.set_xlim(edges[0], edges[-1])
         axis.set_ylim(0, rows)
         axis.set_xticks(centres, [f"{miss:g}" for miss in grid.misses], rotation=90)
         axis.set_yticks(np.arange(rows) + 0.5, [f"{speed:g}" for speed in grid.speeds])
         axis.tick_params(length=0, pad=2)
-    figure.supxlabel("miss distance [m; rad]", fontsize=8)
-    figure.supylabel("speed past the singularity [rad/s; m/s]", fontsize=8)
-    _key(figure, axes, one)
+    _key(figure, one)
     return save(figure, target, file)
 
 
@@ -197,48 +198,58 @@ def _cells(
     )
 
 
-def _write(axis: Any, centres: Array, one: _Map, values: Array, broken: Array) -> None:
+def _write(axis: Any, centres: Array, one: _Map, values: Array, failed: Mask) -> None:
     for (row, column), value in np.ndenumerate(values):
-        if np.isfinite(broken[row, column]):
-            text, colour = "x", "white"
+        if failed[row, column]:
+            text, colour = OUTCOME_MARKS[-1], "white"
         elif np.isfinite(value):
             text, colour = one.text(value), _readable_on(one.colours(one.norm(value)))
         else:
             continue
         axis.text(
-            centres[column], row + 0.47, text, ha="center", va="center", fontsize=5, color=colour
+            centres[column],
+            row + 0.47,
+            text,
+            ha="center",
+            va="center",
+            fontsize=5,
+            color=colour,
+            in_layout=False,
         )
 
 
 def _readable_on(background: Any) -> str:
     """Black or white, whichever stands out (relative luminance of sRGB)."""
-    linear = [((c + 0.055) / 1.055) ** 2.4 if c > 0.04045 else c / 12.92 for c in to_rgb(background)]
+    linear = [
+        ((c + 0.055) / 1.055) ** 2.4 if c > 0.04045 else c / 12.92 for c in to_rgb(background)
+    ]
     luminance = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
     return "black" if luminance > 0.18 else "white"
 
 
-def _key(figure: Any, axes: Sequence[Any], one: _Map) -> None:
+def _key(figure: Any, one: _Map) -> None:
     """The colour bar, or what the categories are called."""
-    if one.name == "outcome":
+    if not one.bar:
+        names = [
+            f"{name} ({mark})" if mark else name
+            for name, mark in zip(OUTCOMES, OUTCOME_MARKS, strict=True)
+        ]
         handles = [
-            Patch(facecolor=colour, edgecolor="0.6", linewidth=0.4, label=f"{name} ({mark})" if mark else name)
-            for colour, name, mark in zip(OUTCOME_COLOURS, OUTCOMES, OUTCOME_MARKS, strict=True)
-        ]  # fmt: skip
-        figure.legend(handles=handles, loc="outside upper center", ncols=min(5, 2 * len(axes)))
+            Patch(facecolor=colour, edgecolor="0.6", linewidth=0.4, label=name)
+            for colour, name in zip(OUTCOME_COLOURS, names, strict=True)
+        ]
+        figure.legend(handles=handles, loc="upper center", ncols=len(handles))
         return
     bar = figure.colorbar(
         ScalarMappable(one.norm, one.colours),
-        ax=list(axes),
-        location="top",
-        aspect=50,
-        shrink=0.7,
-        pad=0.02,
-        extend=one.extend,
+        cax=place_at_top(figure, width=4.5, height=0.08, down=0.36),
+        orientation="horizontal",
+        ticklocation="top",
+        extend="both",
     )
     bar.set_label(one.bar)
-    bar.ax.xaxis.set_minor_locator(NullLocator())
-    bar.ax.xaxis.set_major_locator(LogLocator(subs=(1.0,) if one.norm.vmax > 30 * one.norm.vmin else (1, 2, 5)))
-    bar.ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    bar.ax.tick_params(pad=1)
+    label_decades(bar.ax.xaxis, bar.vmax / bar.vmin)
     bar.outline.set_visible(False)
 
 

@@ -10,7 +10,7 @@ import pandas as pd
 from dikbench.oracle import ORACLE
 from dikbench.report.style import law_name
 
-LEAST_ERROR = 1e-6
+LEAST_ERROR = 1e-5
 """Nothing below this [m] is drawn: the axes are logarithmic."""
 
 

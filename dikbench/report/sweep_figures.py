@@ -88,14 +88,15 @@ def _caption(sweep: Sweep, quantity: _Quantity) -> str:
     )
 
 
-def _draw(
-    sweep: Sweep, quantity: _Quantity, laws: Sequence[str], target: Path, file: str
-) -> str:
+def _draw(sweep: Sweep, quantity: _Quantity, laws: Sequence[str], target: Path, file: str) -> str:
     scale = ValueScale(sweep.rows["value"])
     worth = quantity.scale * sweep.rows[quantity.column].where(sweep.rows["status"].eq("ok"))
     rows = sweep.rows.assign(worth=worth.clip(lower=quantity.least))
     table = rows.groupby(["formulation", "second", "value"], sort=False)["worth"].median()
-    figure, axes = small_multiples(laws, height=1.15)
+    x_label = f"{sweep.parameter}{UNITS.get(sweep.parameter, '')}"
+    figure, axes = small_multiples(
+        laws, 0.85, x_label, quantity.label, top=0.62 if sweep.second else 0.22
+    )
     for axis, law in zip(axes, laws, strict=True):
         if not sweep.second:
             _others(axis, scale, table)
@@ -112,11 +113,8 @@ def _draw(
             axis.plot(broken, top, "x", color=colour, markersize=3, transform=transform)
         if quantity.name == "peak_speed":
             axis.axhline(1.0, color="0.4", linewidth=0.7, zorder=1)
-    for axis in axes:
-        logarithmic(axis, "y")
-        scale.label(axis)
-    figure.supxlabel(f"{sweep.parameter}{UNITS.get(sweep.parameter, '')}", fontsize=8)
-    figure.supylabel(quantity.label, fontsize=8)
+    logarithmic(axes[0], "y")  # they share their axes
+    scale.label(axes)
     if sweep.second:
         handles, labels = axes[0].get_legend_handles_labels()
         figure.legend(
@@ -124,7 +122,7 @@ def _draw(
             labels,
             title=f"{sweep.second}{UNITS.get(sweep.second, '')}",
             title_fontsize=7,
-            loc="outside upper center",
+            loc="upper center",
             ncols=len(labels),
         )
     return save(figure, target, file)
@@ -142,7 +140,7 @@ def _curves(seconds: pd.Series, several: bool) -> list[tuple[float, Any]]:
 
 def _others(axis: Any, scale: ValueScale, table: pd.Series) -> None:
     """The median law and the middle half of all laws, in grey."""
-    quartiles = table.groupby("value").quantile([0.25, 0.5, 0.75]).unstack().sort_index()
+    quartiles = table.groupby("value").quantile(np.array([0.25, 0.5, 0.75])).unstack().sort_index()
     places = scale.place(quartiles.index)
     axis.fill_between(places, quartiles[0.25], quartiles[0.75], color="0.87", linewidth=0)
     axis.plot(places, quartiles[0.5], color="0.65", linewidth=0.9)

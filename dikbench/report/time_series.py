@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -13,13 +12,16 @@ import pandas as pd
 from dikbench.array import Array
 from dikbench.motion import Motion
 from dikbench.report.figure import Figure
-from dikbench.report.rows import how, one_way
+from dikbench.report.rows import LEAST_ERROR, how, one_way
 from dikbench.report.stored_motions import in_panels, points_per_curve, stored_motions, thinned
 from dikbench.report.style import WIDTH, logarithmic, look, save, short
 from dikbench.run.results import ResultsFolder
 
-LEAST = 1e-3
-"""Nothing below this [mm, or share of a limit] is drawn: the axes are logarithmic."""
+POSITION, CONTOUR = "position error [mm]", "contour error [mm]"
+SPEED = "largest joint speed over limit"
+
+LEAST = {POSITION: 1e3 * LEAST_ERROR, CONTOUR: 1e3 * LEAST_ERROR, SPEED: 1e-2}
+"""Nothing below this is drawn: the axes are logarithmic."""
 
 
 def draw_time_series(
@@ -41,16 +43,18 @@ def draw_time_series(
     )
     most = points_per_curve(len(motions) * len(columns))
     for line, names in zip(axes, rows, strict=True):
-        for axis, values in zip(line, columns.values(), strict=True):
+        for axis, (label, values) in zip(line, columns.items(), strict=True):
             for number, name in enumerate(names):
                 time, curve = thinned(values[name], motions[name].trace.dt, most)
-                axis.plot(time, np.maximum(curve, LEAST), label=short(name, 22), **look(number))
+                axis.plot(
+                    time, np.maximum(curve, LEAST[label]), label=short(name, 22), **look(number)
+                )
         line[-1].axhline(1.0, color="0.4", linewidth=0.7, zorder=1)
         line[-1].legend(loc="center left", bbox_to_anchor=(1.02, 0.5))
     for axis, label in zip(axes[0], columns, strict=True):
         axis.set_title(label)
-    for axis in axes.flat:
-        logarithmic(axis, "y")
+    for axis in axes[0]:
+        logarithmic(axis, "y")  # those below share it
     figure.supxlabel("time [s]", fontsize=8)
     file = save(figure, target, "error_and_speed_against_time")
     shown = one_way(ran[ran["scenario"].eq(scenario)])
@@ -64,18 +68,27 @@ def draw_time_series(
 def _columns(motions: Mapping[str, Motion]) -> dict[str, dict[str, Array]]:
     """What is drawn, with its label: the values of each law."""
     columns = {
-        "position error [mm]": {
-            name: 1e3 * motion.position_error for name, motion in motions.items()
-        },
-        "largest joint speed over limit": {
-            name: _speed_ratio(motion) for name, motion in motions.items()
-        },
+        POSITION: {name: 1e3 * motion.position_error for name, motion in motions.items()},
+        CONTOUR: {name: 1e3 * _contour_error(motion) for name, motion in motions.items()},
+        SPEED: {name: _speed_ratio(motion) for name, motion in motions.items()},
     }
+    same = all(
+        np.array_equal(columns[POSITION][name], columns[CONTOUR][name], equal_nan=True)
+        for name in motions
+    )
+    if same:  # there is no path
+        del columns[CONTOUR]
     return columns
 
 
-def _speed_ratio(motion: Motion) -> Any:
+def _contour_error(motion: Motion) -> Array:
+    error: Array = getattr(motion, "contour_error", motion.position_error)
+    return error
+
+
+def _speed_ratio(motion: Motion) -> Array:
     limit, applied = motion.scenario.robot.limits.velocity, motion.trace.applied
     if limit is None:
         return np.full(len(applied), np.nan)
-    return limit.usage(applied).max(axis=1)
+    ratio: Array = limit.usage(applied).max(axis=1)
+    return ratio

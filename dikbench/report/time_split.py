@@ -50,6 +50,7 @@ def draw_time_split(ran: pd.DataFrame, target: Path) -> list[Figure]:
         _bars(axis, group)
     axes[-1, 0].set_xlabel("time of one control step [us]")
     handles, labels = axes[0, 0].get_legend_handles_labels()
+    handles, labels = [*handles[1:], handles[0]], [*labels[1:], labels[0]]  # the tick last
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
     caption = (
         "Time of one control step, medians over the scenarios that were timed, one core, one "

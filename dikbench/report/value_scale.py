@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -46,16 +46,16 @@ class ValueScale:
         places[given > 0] = np.log10(given[given > 0] / self._least)
         return places
 
-    def label(self, axis: Any) -> None:
-        """Write the values at the x axis, as many as there is room for."""
+    def label(self, axes: Sequence[Any]) -> None:
+        """Write the values at the x axis that some axes share, as many as there is room for."""
         low, high = float(self.places[0]), float(self.places[-1])
         margin = 0.04 * (high - low) or 0.5
-        axis.set_xlim(low - margin, high + margin)
+        axes[0].set_xlim(low - margin, high + margin)
         kept: list[int] = []
         for index in (0, len(self.values) - 1, *range(1, len(self.values) - 1)):
             near = [abs(self.places[index] - self.places[other]) for other in kept]
             if min(near, default=np.inf) >= CLOSEST * (high - low + 2 * margin):
                 kept.append(index)
-        axis.set_xticks(
-            self.places[kept], [f"{value:g}" for value in self.values[kept]], rotation=90
-        )
+        axes[0].set_xticks(self.places[kept], [f"{value:g}" for value in self.values[kept]])
+        for axis in axes:
+            axis.tick_params(axis="x", labelrotation=90)
