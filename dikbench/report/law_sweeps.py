@@ -133,4 +133,5 @@ def _draw(sweep: LawSweep, target: Path, file: str) -> str:
 
 def _curve(axis: Any, scale: ValueScale, curve: pd.Series, label: str, place: int) -> None:
     style = {**look(place), **marker(place), "linewidth": 1.2}
-    axis.plot(scale.place(curve.index), curve.to_numpy(), label=label, markersize=3.5, **style)
+    points = scale.curve(curve.index.to_numpy(dtype=float), curve.to_numpy())
+    axis.plot(*points, label=label, markersize=3.5, **style)

@@ -118,9 +118,10 @@ def _maps(grid: NearMissGrid) -> list[_Map]:
         _Map(
             "outcome",
             "outcome",
-            "What became of the trial, the worst of its seeds and that applies: failed; violating a limit; off "
-            f"course (more than {np.degrees(OFF_COURSE):.0f} deg from the wanted direction at some "
-            f"step); slow (less than {100 * SLOW:.0f} % of the wanted motion at some step); ok.",
+            "What became of the trial, the worst over its seeds: failed; else violating a limit; "
+            f"else off course (more than {np.degrees(OFF_COURSE):.0f} deg from the wanted "
+            f"direction at some step); else slow (less than {100 * SLOW:.0f} % of the wanted "
+            "motion at some step); else ok.",
             shown.values("outcome", "max"),
             ListedColormap(list(OUTCOME_COLOURS)),
             BoundaryNorm(np.arange(-0.5, len(OUTCOMES)), len(OUTCOMES)),

@@ -23,7 +23,7 @@ class Sweep:
         parameter: what is swept.
         second: the parameter that tells several sweeps apart; empty where there is one.
         others: the other parameters, as in a selector.
-        rows: their trials, with columns `value` and `second` (0 where there is one sweep).
+        rows: their trials, with columns `value` and `second`, a text.
     """
 
     family: str
@@ -33,8 +33,8 @@ class Sweep:
     rows: pd.DataFrame
 
 
-Place = tuple[float, float]
-"""The value of the swept parameter and of the second one."""
+Place = tuple[float, str]
+"""The value of the swept parameter, and that of the second one."""
 
 
 def sweeps(trials: pd.DataFrame) -> list[Sweep]:
@@ -46,11 +46,11 @@ def sweeps(trials: pd.DataFrame) -> list[Sweep]:
         families.setdefault(selector.name, {})[name] = selector.parameters
     found: list[Sweep] = []
     for family, members in families.items():
-        shown: list[set[str]] = []
+        shown: set[str] = set()
         for parameter, second, others, places in _longest_first(members):
-            if any(places.keys() <= already for already in shown):
+            if places.keys() <= shown:
                 continue
-            shown.append(set(places))
+            shown |= places.keys()
             rows = chosen[chosen["scenario"].isin(places)]
             values = [places[scenario] for scenario in rows["scenario"]]
             rows = rows.assign(value=[v for v, _ in values], second=[s for _, s in values])
@@ -62,15 +62,11 @@ def _longest_first(
     members: Mapping[str, Mapping[str, str]],
 ) -> list[tuple[str, str, str, dict[str, Place]]]:
     """The sweeps in the scenarios of a family, those over more scenarios and values first."""
-    numeric = [
-        key
-        for key in dict.fromkeys(k for parameters in members.values() for k in parameters)
-        if any(number(parameters.get(key, "")) is not None for parameters in members.values())
-    ]
+    keys = list(dict.fromkeys(key for parameters in members.values() for key in parameters))
     found = [
         (parameter, second, others, places)
-        for parameter in numeric
-        for second in ("", *(key for key in numeric if key != parameter))
+        for parameter in keys
+        for second in ("", *(key for key in keys if key != parameter))
         for others, places in _groups(members, parameter, second).items()
         if _is_sweep(places, second)
     ]
@@ -86,7 +82,7 @@ def _groups(
     groups: dict[str, dict[str, Place]] = {}
     for name, parameters in members.items():
         value = number(parameters.get(parameter, ""))
-        other = number(parameters.get(second, "")) if second else 0.0
+        other = parameters.get(second) if second else ""
         if value is not None and other is not None:
             rest = (f"{k}={v}" for k, v in parameters.items() if k not in {parameter, second})
             groups.setdefault(",".join(rest), {})[name] = (value, other)
@@ -95,7 +91,7 @@ def _groups(
 
 def _is_sweep(places: Mapping[str, Place], second: str) -> bool:
     """Whether each of the sweeps has enough values, and there are several where it says so."""
-    values: dict[float, set[float]] = {}
+    values: dict[str, set[float]] = {}
     for value, other in places.values():
         values.setdefault(other, set()).add(value)
     return min(map(len, values.values())) >= FEWEST and (len(values) > 1 or not second)

@@ -46,16 +46,23 @@ class ValueScale:
         places[given > 0] = np.log10(given[given > 0] / self._least)
         return places
 
+    def curve(self, values: Array, heights: Array) -> tuple[Array, Array]:
+        """A curve over ascending values, broken between 0 and the others where 0 stands apart."""
+        places = self.place(values)
+        if not (self._logarithmic and len(values) and values[0] == 0.0):
+            return places, heights
+        return np.insert(places, 1, np.nan), np.insert(heights, 1, np.nan)
+
     def label(self, axes: Sequence[Any]) -> None:
         """Write the values at the x axis that some axes share, as many as there is room for."""
         low, high = float(self.places[0]), float(self.places[-1])
         margin = 0.04 * (high - low) or 0.5
-        axes[0].set_xlim(low - margin, high + margin)
         kept: list[int] = []
         for index in (0, len(self.values) - 1, *range(1, len(self.values) - 1)):
             near = [abs(self.places[index] - self.places[other]) for other in kept]
             if min(near, default=np.inf) >= CLOSEST * (high - low + 2 * margin):
                 kept.append(index)
+        axes[0].set_xlim(low - margin, high + margin)
         axes[0].set_xticks(self.places[kept], [f"{value:g}" for value in self.values[kept]])
         for axis in axes:
             axis.tick_params(axis="x", labelrotation=90)
