@@ -60,7 +60,13 @@ def make_trials() -> MakeTrials:
 def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """The figures that are drawn, in their order, open to be read."""
     kept: list[Any] = []
-    monkeypatch.setattr(style_module.plt, "close", kept.append)
+    close = style_module.plt.close
+
+    def keep(figure: Any) -> None:
+        kept.append(figure)
+        close(figure)
+
+    monkeypatch.setattr(style_module.plt, "close", keep)
     return kept
 
 
