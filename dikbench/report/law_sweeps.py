@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib.pyplot as plt
+import numpy as np
 import pandas as pd
 
 from dikbench.report.figure import Figure
@@ -63,7 +64,7 @@ def draw_law_sweeps(ran: pd.DataFrame, target: Path) -> list[Figure]:
     """Draw every sweep of a numeric parameter of a law."""
     figures = []
     for place, sweep in enumerate(law_sweeps(ran), start=1):
-        if not sweep.rows["status"].eq("ok").any():
+        if not np.isfinite(per_family(sweep)["error"]).any():
             continue
         _, name = error_column(sweep.rows)
         file = file_name("law", sweep.law, sweep.parameter, place)

@@ -111,6 +111,8 @@ def logarithmic(axis: Any, which: str) -> None:
     """Make an axis logarithmic, with plain numbers at decades, or 1, 2, 5 where there are few."""
     getattr(axis, f"set_{which}scale")("log")
     low, high = getattr(axis, f"get_{which}lim")()
+    if not 0.0 < low < high < float("inf"):  # nothing is drawn
+        low, high = getattr(axis, f"set_{which}lim")(0.1, 10.0)
     label_decades(getattr(axis, f"{which}axis"), high / low)
 
 

@@ -67,7 +67,7 @@ def time_parts(ran: pd.DataFrame) -> pd.DataFrame:
     timed = ran[ran["law_time_median_us"].notna()].drop_duplicates(["law", "scenario"])
     medians = timed.groupby("law", sort=False)[[*PARTS, P99]].median()
     totals = medians[list(PARTS)].sum(axis=1)
-    return medians.loc[totals.sort_values(kind="stable").index]
+    return medians.loc[totals[totals > 0].sort_values(kind="stable").index]
 
 
 def _groups(table: pd.DataFrame) -> list[pd.DataFrame]:
