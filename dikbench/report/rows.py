@@ -10,13 +10,17 @@ import pandas as pd
 from dikbench.oracle import ORACLE
 from dikbench.report.style import law_name
 
-LEAST_ERROR = 1e-6
+LEAST_ERROR = 1e-5
 """Nothing below this [m] is drawn: the axes are logarithmic."""
 
 
 def that_ran(trials: pd.DataFrame) -> pd.DataFrame:
-    """The trials that took a step, with a column `law` that names law and solver."""
-    ran = trials[trials["status"].ne("skipped") & trials["steps"].gt(0)].copy()
+    """The trials that took a step, with a column `law` that names law and solver.
+
+    Infinite numbers, which have no place on an axis, are missing ones here.
+    """
+    ran = trials[trials["status"].ne("skipped") & trials["steps"].gt(0)]
+    ran = ran.replace([np.inf, -np.inf], np.nan)
     ran["law"] = [law_name(f, s) for f, s in zip(ran["formulation"], ran["solver"], strict=True)]
     return ran
 

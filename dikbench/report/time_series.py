@@ -1,7 +1,8 @@
-"""Error and speed against time for the runs of one scenario."""
+"""Errors and joint speed against time for the runs of one scenario."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -9,57 +10,85 @@ import numpy as np
 import pandas as pd
 
 from dikbench.array import Array
-from dikbench.motion import recompute
-from dikbench.registry import make_scenario
-from dikbench.report.style import look, save
+from dikbench.motion import Motion
+from dikbench.report.figure import Figure
+from dikbench.report.rows import LEAST_ERROR, how, one_way
+from dikbench.report.stored_motions import in_panels, points_per_curve, stored_motions, thinned
+from dikbench.report.style import WIDTH, logarithmic, look, save, short
 from dikbench.run.results import ResultsFolder
-from dikbench.scenario import Scenario
-from dikbench.trace import Trace
 
-LEAST = 1e-3
-"""Nothing below this [mm, or share of a limit] is drawn: the axes are logarithmic."""
+POSITION, CONTOUR = "position error [mm]", "contour error [mm]"
+SPEED = "largest joint speed over limit"
+
+LEAST = {POSITION: 1e3 * LEAST_ERROR, CONTOUR: 1e3 * LEAST_ERROR, SPEED: 1e-2}
+"""Nothing below this is drawn: the axes are logarithmic."""
 
 
 def draw_time_series(
-    folder: ResultsFolder, rows: pd.DataFrame, scenario_name: str, target: Path
-) -> str | None:
-    """Draw the stored traces of one scenario on the ideal plant, one curve per law.
+    folder: ResultsFolder, ran: pd.DataFrame, scenario: str, target: Path
+) -> list[Figure]:
+    """Draw the stored traces of one scenario, a row of panels for every few laws."""
+    motions = stored_motions(folder, ran, scenario)
+    if not motions:
+        return []
+    columns = _columns(motions)
+    rows = in_panels(list(motions))
+    figure, axes = plt.subplots(
+        len(rows),
+        len(columns),
+        figsize=(WIDTH, 0.7 + 1.35 * max(len(rows), 1.5)),
+        sharex=True,
+        sharey="col",
+        squeeze=False,
+    )
+    most = points_per_curve(len(motions) * len(columns))
+    for line, names in zip(axes, rows, strict=True):
+        for axis, (label, values) in zip(line, columns.items(), strict=True):
+            for number, name in enumerate(names):
+                time, curve = thinned(values[name], motions[name].trace.dt, most)
+                axis.plot(
+                    time, np.maximum(curve, LEAST[label]), label=short(name, 22), **look(number)
+                )
+        line[-1].axhline(1.0, color="0.4", linewidth=0.7, zorder=1)
+        line[-1].legend(loc="center left", bbox_to_anchor=(1.02, 0.5))
+    for axis, label in zip(axes[0], columns, strict=True):
+        axis.set_title(label)
+    for axis in axes[0]:
+        logarithmic(axis, "y")  # those below share it
+    figure.supxlabel("time [s]", fontsize=8)
+    file = save(figure, target, "error_and_speed_against_time")
+    shown = one_way(ran[ran["scenario"].eq(scenario)])
+    caption = (
+        f"{'; '.join(label[0].upper() + label[1:] for label in columns)} against time: {scenario}, "
+        f"{how(shown)}, one solver per law, from the best law to the worst by its error."
+    )
+    return [Figure(file, caption, "Error and joint speed against time")]
 
-    Returns:
-        The figure's file name, or None where no trace of the scenario is stored.
-    """
-    chosen = rows[
-        rows["scenario"].eq(scenario_name)
-        & rows["plant"].eq("ideal")
-        & rows["reference"].eq("time")
-    ].drop_duplicates("formulation")
-    traces = {
-        row.formulation: Trace.load(path)
-        for row in chosen.itertuples()
-        if (path := folder.trace(str(row.id))).is_file()
+
+def _columns(motions: Mapping[str, Motion]) -> dict[str, dict[str, Array]]:
+    """What is drawn, with its label: the values of each law."""
+    columns = {
+        POSITION: {name: 1e3 * motion.position_error for name, motion in motions.items()},
+        CONTOUR: {name: 1e3 * _contour_error(motion) for name, motion in motions.items()},
+        SPEED: {name: _speed_ratio(motion) for name, motion in motions.items()},
     }
-    if not traces:
-        return None
-    scenario = make_scenario(scenario_name, int(chosen["seed"].iloc[0]))
-    figure, (upper, lower) = plt.subplots(2, 1, figsize=(7.2, 5.2), sharex=True)
-    for number, (name, trace) in enumerate(traces.items()):
-        motion = recompute(trace, scenario)
-        time = np.arange(trace.steps + 1) * trace.dt
-        upper.plot(time, np.maximum(1e3 * motion.position_error, LEAST), label=name, **look(number))
-        lower.plot(time[:-1], _speed_ratio(trace, scenario), label=name, **look(number))
-    upper.set_yscale("log")
-    upper.set_ylabel("position error [mm]")
-    lower.set_yscale("log")
-    lower.set_ylabel("largest joint speed over limit")
-    lower.axhline(1.0, color="0.5", linewidth=0.8)
-    lower.set_xlabel("time [s]")
-    figure.legend(*upper.get_legend_handles_labels(), loc="outside right upper")
-    return save(figure, target, "error_and_speed_against_time")
+    same = all(
+        np.array_equal(columns[POSITION][name], columns[CONTOUR][name], equal_nan=True)
+        for name in motions
+    )
+    if same:  # there is no path
+        del columns[CONTOUR]
+    return columns
 
 
-def _speed_ratio(trace: Trace, scenario: Scenario) -> Array:
-    limit = scenario.robot.limits.velocity
+def _contour_error(motion: Motion) -> Array:
+    error: Array = getattr(motion, "contour_error", motion.position_error)
+    return error
+
+
+def _speed_ratio(motion: Motion) -> Array:
+    limit, applied = motion.scenario.robot.limits.velocity, motion.trace.applied
     if limit is None:
-        return np.full(trace.steps, np.nan)
-    ratio: Array = np.maximum(limit.usage(trace.applied).max(axis=1), LEAST)
+        return np.full(len(applied), np.nan)
+    ratio: Array = limit.usage(applied).max(axis=1)
     return ratio

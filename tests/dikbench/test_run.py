@@ -127,7 +127,7 @@ def test_tables_figures_and_manifest_are_written(results: Path) -> None:
     figures = {path.name for path in (results / "figures").glob("*.svg")}
     assert {
         "error_and_speed_against_time.svg",
-        "off_course_against_progress.svg",
+        "off_course_against_slow_down.svg",
         "time_per_law_and_solver.svg",
     } <= figures
     manifest = json.loads((results / "manifest.json").read_text())
