@@ -13,6 +13,7 @@ from dikbench.report.joint_margins import draw_joint_margins
 from dikbench.report.law_sweeps import draw_law_sweeps
 from dikbench.report.pareto import draw_off_course_and_slow_down
 from dikbench.report.phase_diagram import draw_phase_diagrams
+from dikbench.report.profile_figures import draw_profiles
 from dikbench.report.rows import one_solver_each, that_ran
 from dikbench.report.style import style
 from dikbench.report.sweep_figures import draw_sweeps
@@ -46,6 +47,7 @@ def draw_figures(
             *draw_time_series(folder, laws, example, target),
             *draw_joint_margins(folder, laws, example, target),
             *draw_law_sweeps(laws, target),
+            *draw_profiles(trials, target),
             *draw_error_and_time(ran, target),
             *draw_time_split(ran, target),
         ]
