@@ -13,6 +13,9 @@ from dikbench.report.words import Law
 SAME: Final = 0.01
 """Values closer together than this share of the smaller one are the same."""
 
+MOST: Final = 2 / 3
+"""A law is better than another where it wins this share of the trials that one of them wins."""
+
 ROUNDING: Final = 1e-9
 """Differences smaller than this are rounding."""
 
@@ -22,7 +25,7 @@ class Lead:
     """The law with the smallest median of a metric, and those that cannot be told apart from it.
 
     Attributes:
-        laws: all of them, the one with the smallest median first.
+        laws: all of them, in the order in which they ran.
         value: the smallest median.
         runner_up: the next law that can be told apart; None where there is none.
         runner_up_value: its median.
@@ -49,7 +52,7 @@ def lead(rows: pd.DataFrame, metric: str, laws: Sequence[Law]) -> Lead | None:
     """Who leads in a metric of which the smallest value is the best.
 
     Another law is told apart from the leader only where its median is larger by more than 1 %, and
-    the leader is better by more than that in more than half of the trials that both ran.
+    where the leader wins at least two thirds of the trials in which they differ by more than that.
 
     Args:
         rows: trials of one plant and one reference mode.
@@ -65,22 +68,26 @@ def lead(rows: pd.DataFrame, metric: str, laws: Sequence[Law]) -> Lead | None:
         return None
     medians = table.median().sort_values(kind="stable")
     best = medians.index[0]
-    together, apart = [best], []
+    together: list[Law] = [best]
+    apart: dict[Law, int] = {}
     for law in medians.index[1:]:
         wins = int(_smaller(table[best], table[law]).sum())
-        told = medians[law] - medians[best] > SAME * medians[best] + ROUNDING
-        if told and 2 * wins > len(table):
-            apart.append((law, wins))
+        told = medians[law] - medians[best] > SAME * abs(medians[best]) + ROUNDING
+        losses = int(_smaller(table[law], table[best]).sum())
+        if told and wins >= MOST * (wins + losses):
+            apart[law] = wins
         else:
             together.append(law)
-    runner_up, wins = apart[0] if apart else (None, 0)
+    order = list(table.columns)
+    together.sort(key=order.index)
+    value = float(medians[best])
+    if not apart:
+        return Lead(tuple(together), value, None, float("nan"), 0, len(table))
+    second = min(medians[law] for law in apart)
+    alike = [law for law in apart if medians[law] <= second + SAME * abs(second)]
+    runner_up = min(alike, key=order.index)
     return Lead(
-        tuple(together),
-        float(medians[best]),
-        runner_up,
-        float(medians[runner_up]) if runner_up else float("nan"),
-        wins,
-        len(table),
+        tuple(together), value, runner_up, float(medians[runner_up]), apart[runner_up], len(table)
     )
 
 

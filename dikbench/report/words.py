@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Final
+
+import pandas as pd
 
 Law = tuple[str, str]
 """A formulation and its solver."""
@@ -49,23 +51,28 @@ def listed(names: Sequence[str], most: int | None = FEW) -> str:
     return " and ".join([", ".join(shown[:-1]), shown[-1]]) if len(shown) > 1 else "".join(shown)
 
 
-def laws_named(laws: Iterable[Law], solvers: Mapping[str, Sequence[str]]) -> list[str]:
-    """Laws with their solvers: `qp` (daqp, osqp); "all 8 solvers" where it is all that it ran with.
+class Names:
+    """How laws with their solvers are called in the sentences of one run.
 
     Args:
-        laws: those that are meant.
-        solvers: the solvers with which each formulation ran.
+        rows: every trial of the run.
     """
-    groups: dict[str, list[str]] = {}
-    for formulation, solver in laws:
-        groups.setdefault(formulation, []).append(solver)
-    names = []
-    for formulation, with_ in groups.items():
-        every = len(with_) == len(solvers[formulation])
-        if every and len(with_) > 2:
-            names.append(f"`{formulation}` (all {len(with_)} solvers)")
-        elif with_ == ["none"] or (every and len(with_) == 1):
-            names.append(f"`{formulation}`")
-        else:
-            names.append(f"`{formulation}` ({', '.join(with_)})")
-    return names
+
+    def __init__(self, rows: pd.DataFrame) -> None:
+        pairs = rows[["formulation", "solver"]].drop_duplicates()
+        self._solvers = pairs.groupby("formulation", sort=False)["solver"].agg(list).to_dict()
+
+    def of(self, laws: Iterable[Law]) -> str:
+        """The laws in words: `dls`, `qp` (all 8 solvers) and `lp-alpha` (daqp)."""
+        groups: dict[str, list[str]] = {}
+        for formulation, solver in laws:
+            groups.setdefault(formulation, []).append(solver)
+        return listed([self._named(*group) for group in groups.items()])
+
+    def _named(self, formulation: str, solvers: list[str]) -> str:
+        every = len(solvers) == len(self._solvers[formulation])
+        if every and len(solvers) > 2:
+            return f"`{formulation}` (all {len(solvers)} solvers)"
+        if every and len(solvers) == 1:
+            return f"`{formulation}`"
+        return f"`{formulation}` ({listed(solvers)})"
