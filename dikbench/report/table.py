@@ -10,6 +10,17 @@ from typing import Literal
 ALL = "all"
 """Stands for all families."""
 
+DIGITS = 3
+"""Significant digits that are shown; what agrees in them is equally good."""
+
+ROUNDING = 1e-9
+"""What is smaller than this is rounding, and shown as 0 (CSV keeps it)."""
+
+
+def shown(value: float) -> str:
+    """A number as it is read: `DIGITS` significant digits, 0 where it is rounding."""
+    return f"{value:.{DIGITS}g}" if abs(value) >= ROUNDING else "0"
+
 
 @dataclass(frozen=True)
 class Column:
@@ -23,6 +34,7 @@ class Column:
         better: which direction is better; None where neither is (a count of trials).
         interval: whether its cells carry an interval.
         count: whether its cells are whole numbers.
+        shift: of a shifted geometric mean, in the unit of the column; NaN where it is none.
     """
 
     key: str
@@ -31,6 +43,7 @@ class Column:
     better: Literal["low", "high"] | None = None
     interval: bool = False
     count: bool = False
+    shift: float = nan
 
 
 @dataclass(frozen=True)
