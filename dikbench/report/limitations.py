@@ -11,7 +11,7 @@ import pandas as pd
 from dikbench.oracle import ORACLE
 from dikbench.plants import DRIVES, REFERENCE_MODES
 from dikbench.registry import plugins
-from dikbench.report.words import listed, number, several
+from dikbench.report.words import listed, number, quoted, several
 from dikbench.run.stability import STABLE
 from dikbench.selector import parse_selector
 from dikbench.solvers.catalogue import BACK_ENDS, is_installed
@@ -56,20 +56,24 @@ def limitations(
     return found
 
 
-def _missing(trials: pd.DataFrame, manifest: Mapping[str, Any]) -> list[Limitation]:
-    """Trials that were planned and have no row, and rows that were not planned."""
-    planned = int(manifest.get("trials", 0))
+def missing(trials: pd.DataFrame, manifest: Mapping[str, Any]) -> int:
+    """How many trials were planned and have no row."""
     inside = int(in_plan(trials, manifest["study"]).sum())
+    return max(0, int(manifest.get("trials", 0)) - inside)
+
+
+def _missing(trials: pd.DataFrame, manifest: Mapping[str, Any]) -> list[Limitation]:
+    """Trials without a row, and rows that the last study does not ask for."""
     found = []
-    if planned > inside:
+    if lacking := missing(trials, manifest):
         found.append(
-            f"The run is not complete: {planned - inside} of {planned} trials are missing; the "
-            "command below finishes it."
+            f"The run is not complete: {lacking} of {manifest['trials']} trials are missing; its "
+            "command, given again, finishes it."
         )
-    if inside < len(trials):
+    if others := int((~in_plan(trials, manifest["study"])).sum()):
         found.append(
-            f"{several(len(trials) - inside, 'row')} of earlier runs in this folder, which the "
-            "last study does not ask for, are counted with the others."
+            f"{several(others, 'row')} of earlier runs in this folder, which the last study does "
+            "not ask for, are counted with the others."
         )
     return [Limitation(text) for text in found]
 
@@ -110,7 +114,7 @@ def _times(trials: pd.DataFrame) -> list[Limitation]:
                 f"Of {len(cells)} timed cells {len(unstable)} are not stable (greyed; timing.csv "
                 "says why); `dikbench time` takes them anew, on a machine that does nothing else.",
                 tuple(
-                    f"{_law(row.formulation, row.solver)} on `{row.scenario}`: "
+                    f"{_law(row.formulation, row.solver)} on {quoted(row.scenario)}: "
                     f"{row.timing_verdict}."
                     for row in unstable.itertuples()
                 ),
@@ -228,7 +232,7 @@ def _not_run(trials: pd.DataFrame) -> list[Limitation]:
         used = {parse_selector(text).name for text in ran[column].unique()}
         left_out = [name for name in known if name not in used]
         if left_out:
-            names = listed([f"`{name}`" for name in left_out], most=None)
+            names = listed([quoted(name) for name in left_out], most=None)
             cases.append(f"{len(left_out)} of {len(known)} {what}: {names}.")
     for column, modes in (("plant", DRIVES), ("reference", REFERENCE_MODES)):
         used = {parse_selector(text).name for text in ran[column].unique()}
@@ -239,7 +243,7 @@ def _not_run(trials: pd.DataFrame) -> list[Limitation]:
 
 
 def _law(formulation: str, solver: str) -> str:
-    return f"`{formulation}`" if solver == "none" else f"`{formulation}` with `{solver}`"
+    return quoted(formulation) + ("" if solver == "none" else f" with {quoted(solver)}")
 
 
 def _counted(rows: pd.DataFrame, columns: list[str]) -> list[tuple[tuple[Any, ...], int]]:

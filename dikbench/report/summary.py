@@ -51,6 +51,11 @@ class Summary:
     short: tuple[Finding, ...] = ()
     chapters: tuple[Chapter, ...] = ()
 
+    @property
+    def scenarios(self) -> int:
+        """How many scenarios it speaks of."""
+        return sum(len(chapter.scenarios) for chapter in self.chapters)
+
 
 def summarise(trials: pd.DataFrame) -> Summary:
     """Say which law is for which situation.
@@ -77,7 +82,7 @@ def summarise(trials: pd.DataFrame) -> Summary:
             chapters.append(Chapter(situation, scenarios, findings))
     clock = reference == "time"
     basis = (
-        f"This is of the {plant} plant with a reference that moves on with "
+        f"These sentences are about the {plant} plant with a reference that moves on with "
         f"{'the clock' if clock else 'the progress achieved'}: {several(len(kinds), 'scenario')}, "
         f"{several(rows['seed'].nunique(), 'seed')}. A law leads only where it ran all trials "
         "without failing and the answers of its solver passed the recheck."

@@ -51,6 +51,11 @@ def listed(names: Sequence[str], most: int | None = FEW) -> str:
     return " and ".join([", ".join(shown[:-1]), shown[-1]]) if len(shown) > 1 else "".join(shown)
 
 
+def quoted(name: str) -> str:
+    """A name between backticks."""
+    return f"`{' '.join(name.split()).replace('`', chr(39))}`"
+
+
 class Names:
     """How laws with their solvers are called in the sentences of one run.
 
@@ -70,9 +75,12 @@ class Names:
         return listed([self._named(*group) for group in groups.items()])
 
     def _named(self, formulation: str, solvers: list[str]) -> str:
-        every = len(solvers) == len(self._solvers[formulation])
-        if every and len(solvers) > 2:
-            return f"`{formulation}` (all {len(solvers)} solvers)"
-        if every and len(solvers) == 1:
-            return f"`{formulation}`"
-        return f"`{formulation}` ({listed(solvers)})"
+        name, every = quoted(formulation), self._solvers[formulation]
+        if len(every) == 1:
+            return name
+        others = [solver for solver in every if solver not in solvers]
+        if not others:
+            return f"{name} (all {len(every)} solvers)"
+        if len(others) < len(solvers):
+            return f"{name} (all solvers but {listed([quoted(solver) for solver in others])})"
+        return f"{name} ({listed([quoted(solver) for solver in solvers])})"
