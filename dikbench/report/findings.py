@@ -13,8 +13,7 @@ from dikbench.metrics import NEGLIGIBLE
 from dikbench.report.comparison import SAME, Lead, lead
 from dikbench.report.words import Law, Names, degrees, listed, millimetres, number, several
 from dikbench.run.stability import DRIFT, STABLE
-
-LAW: Final = ["formulation", "solver"]
+from dikbench.statistics.problems import LAW
 
 ON_COURSE: Final = math.radians(1.0)
 """A law that is never farther off course than this stays on it."""

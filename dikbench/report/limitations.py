@@ -15,8 +15,7 @@ from dikbench.report.words import listed, number, quoted, several
 from dikbench.run.stability import STABLE
 from dikbench.selector import parse_selector
 from dikbench.solvers.catalogue import BACK_ENDS, is_installed
-
-LAW: Final = ["formulation", "solver"]
+from dikbench.statistics.problems import LAW
 
 WORTH_SAYING: Final = 0.01
 """A share of steps above this is remarked upon."""

@@ -19,7 +19,10 @@ ROUNDING = 1e-9
 
 def shown(value: float) -> str:
     """A number as it is read: `DIGITS` significant digits, 0 where it is rounding."""
-    return f"{value:.{DIGITS}g}" if abs(value) >= ROUNDING else "0"
+    if abs(value) < ROUNDING:
+        return "0"
+    text = f"{value:.{DIGITS}g}"
+    return f"{float(text):.0f}" if 1e3 <= abs(value) < 1e6 else text
 
 
 @dataclass(frozen=True)
@@ -66,8 +69,9 @@ class Cell:
 
     @property
     def has_interval(self) -> bool:
-        """Whether lower and upper are numbers."""
-        return not (isnan(self.lower) or isnan(self.upper))
+        """Whether there is an interval that, as it is shown, is more than the value itself."""
+        bounds = (self.lower, self.upper)
+        return not any(map(isnan, bounds)) and {*map(shown, bounds)} != {shown(self.value)}
 
 
 @dataclass(frozen=True)
