@@ -78,14 +78,14 @@ def lead(rows: pd.DataFrame, metric: str, laws: Sequence[Law]) -> Lead | None:
             apart[law] = wins
         else:
             together.append(law)
-    order = list(table.columns)
-    together.sort(key=order.index)
+    place = {law: number for number, law in enumerate(laws)}
+    together.sort(key=place.__getitem__)
     value = float(medians[best])
     if not apart:
         return Lead(tuple(together), value, None, float("nan"), 0, len(table))
     second = min(medians[law] for law in apart)
     alike = [law for law in apart if medians[law] <= second + SAME * abs(second)]
-    runner_up = min(alike, key=order.index)
+    runner_up = min(alike, key=place.__getitem__)
     return Lead(
         tuple(together), value, runner_up, float(medians[runner_up]), apart[runner_up], len(table)
     )

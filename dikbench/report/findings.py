@@ -55,7 +55,7 @@ def candidates(rows: pd.DataFrame) -> list[Law]:
     """
     trials = len(rows[["scenario", "seed"]].drop_duplicates())
     groups = rows.groupby(LAW, sort=False)
-    whole = groups["status"].agg(lambda status: len(status) == trials and status.eq("ok").all())
+    whole = rows.assign(ok=rows["status"].eq("ok")).groupby(LAW, sort=False)["ok"].sum() == trials
     trusted = groups["not_verified_share"].max().fillna(0.0) <= TRUSTED
     return list(whole[whole & trusted].index)
 
@@ -135,6 +135,8 @@ def stay_on_course(rows: pd.DataFrame, names: Names) -> Finding:
         best = f"{names.of(leader.laws)} {'get' if len(leader.laws) > 1 else 'gets'} on best"
     else:
         best = names.of(keeping) + (" get on alike" if len(keeping) > 1 else " alone gets on")
+        if len(keeping) == len(staying) > 1:
+            best = "they get on alike"
     return Finding(question, f"{text}. Within the limits {best}, {speed}.")
 
 
@@ -214,9 +216,7 @@ def _alike(medians: pd.Series) -> list[Law]:
     return list(medians[medians <= (1 + DRIFT) * medians.iloc[0]].index)
 
 
-def _closest(
-    rows: pd.DataFrame, laws: Sequence[Law]
-) -> tuple[Lead, Callable[[float], str]] | None:
+def _closest(rows: pd.DataFrame, laws: Sequence[Law]) -> tuple[Lead, Callable[[float], str]] | None:
     """Who leads in the position error, or in that of the orientation where there is no other."""
     for metric, measure in (
         ("position_error_rms_m", millimetres),
@@ -245,4 +245,3 @@ def _accuracy(leader: Lead, measure: Callable[[float], str], names: Names) -> st
 def _every_trial(rows: pd.DataFrame) -> str:
     trials = len(rows[["scenario", "seed"]].drop_duplicates())
     return "the only trial" if trials == 1 else f"all {trials} trials"
-

@@ -137,9 +137,7 @@ def _td(cell: Cell, column: Column) -> Markup:
 def _assets() -> Assets:
     folder = resources.files("dikbench.report") / "assets"
     style = (folder / "report.css").read_text(encoding="utf-8")
-    scripts = [
-        (folder / name).read_text(encoding="utf-8") for name in ("sortable.js", "report.js")
-    ]
+    scripts = [(folder / name).read_text(encoding="utf-8") for name in ("sortable.js", "report.js")]
     return Assets(Markup(style), Markup("\n".join(scripts)))
 
 

@@ -113,9 +113,10 @@ def _times(trials: pd.DataFrame) -> list[Limitation]:
                 f"Of {len(cells)} timed cells {len(unstable)} are not stable (greyed; timing.csv "
                 "says why); `dikbench time` takes them anew, on a machine that does nothing else.",
                 tuple(
-                    f"{_law(row.formulation, row.solver)} on {quoted(row.scenario)}: "
-                    f"{row.timing_verdict}."
-                    for row in unstable.itertuples()
+                    f"{_law(formulation, solver)} on {quoted(scenario)}: {verdict}."
+                    for (formulation, solver, scenario, verdict), _ in _counted(
+                        unstable, [*LAW, "scenario", "timing_verdict"]
+                    )
                 ),
             )
         )
@@ -208,10 +209,11 @@ def _steps(trials: pd.DataFrame) -> list[Limitation]:
             "Acceleration bounds that were given up, where limits contradict one another.",
         ),
     ):
-        worst = trials.groupby(LAW, sort=False)[column].max().dropna()
+        worst = trials.groupby(LAW, sort=False)[column].max().reset_index()
         cases = tuple(
-            f"{_law(*law)}: in up to {number(100 * share)} % of a run's steps."
-            for law, share in worst[worst > WORTH_SAYING].items()
+            f"{_law(formulation, solver)}: in up to {number(100 * share)} % of a run's steps."
+            for formulation, solver, share in worst.itertuples(index=False, name=None)
+            if share > WORTH_SAYING
         )
         if cases:
             found.append(Limitation(text, cases))
@@ -247,5 +249,5 @@ def _law(formulation: str, solver: str) -> str:
 
 def _counted(rows: pd.DataFrame, columns: list[str]) -> list[tuple[tuple[Any, ...], int]]:
     """How many rows share the values of some columns."""
-    counts = rows.groupby(columns, sort=False, dropna=False).size()
-    return [(key, int(count)) for key, count in counts.items()]
+    counts = rows.groupby(columns, sort=False, dropna=False).size().reset_index()
+    return [(tuple(key), int(count)) for *key, count in counts.itertuples(index=False, name=None)]

@@ -97,7 +97,7 @@ def _rows(file: Path, notes: list[str]) -> pd.DataFrame:
         raise DikbenchError(f"{file}: not a table of trials: it has no column {missing[0]!r}")
     whole = [line for line in lines[1:] if len(line) == len(header)]
     rows = pd.DataFrame(whole, columns=header)
-    rows = rows[rows[list(NEEDED)].ne("").all(axis=1)]
+    rows = rows[(rows[list(NEEDED)] != "").all(axis=1)]
     if len(rows) < len(lines) - 1:
         left_out = len(lines) - 1 - len(rows)
         notes.append(f"{file.name} is damaged: {left_out} of {len(lines) - 1} rows are left out.")

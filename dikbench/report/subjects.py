@@ -89,9 +89,13 @@ class Family:
 
 def laws_of(trials: pd.DataFrame) -> list[Law]:
     """The laws of a run in its order, the oracle last."""
-    solvers = trials.groupby("formulation", sort=False)["solver"].agg(lambda s: tuple(s.unique()))
+    solvers: dict[str, list[str]] = {}
+    for selector, solver in zip(trials["formulation"], trials["solver"], strict=True):
+        with_ = solvers.setdefault(selector, [])
+        if solver not in ("none", *with_):
+            with_.append(solver)
     groups: dict[str, list[str]] = {}
-    for selector in solvers.index:
+    for selector in solvers:
         groups.setdefault(parse_selector(selector).name, []).append(selector)
     found = []
     for name in sorted(groups, key=lambda name: name == ORACLE):
@@ -99,7 +103,7 @@ def laws_of(trials: pd.DataFrame) -> list[Law]:
         variants = tuple(
             Variant(
                 selector,
-                tuple(s for s in solvers[selector] if s != "none"),
+                tuple(solvers[selector]),
                 {**defaults, **parse_selector(selector).parameters},
             )
             for selector in groups[name]
@@ -117,7 +121,11 @@ def _described(name: str) -> tuple[str | None, dict[str, str], Path | None]:
     report must not run what they name.
     """
     if name == ORACLE:
-        return "The joint motion from which a scenario's path was built, scored like a law.", {}, None
+        return (
+            "The joint motion from which a scenario's path was built, scored like a law.",
+            {},
+            None,
+        )
     path, colon, class_name = name.rpartition(":")
     if colon and path.endswith(".py"):
         return *_read(Path(path), class_name), None
