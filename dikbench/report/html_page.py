@@ -166,7 +166,7 @@ def _bytes(file: Path) -> bytes | None:
 
 
 def _image(figure: Figure, svg: bytes) -> Inlined:
-    alt = getattr(figure, "alt", figure.caption)
+    alt = getattr(figure, "title", "") or figure.caption
     if not svg:
         return Inlined(figure.file, figure.caption, alt, "")
     uri = f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"

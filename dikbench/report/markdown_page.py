@@ -7,6 +7,7 @@ import jinja2
 from dikbench.report.contents import Contents
 from dikbench.report.markdown import escape, markdown_blocks, markdown_rows
 from dikbench.report.spoken import to_markdown
+from dikbench.report.words import quoted
 
 
 def render_markdown(contents: Contents) -> str:
@@ -20,6 +21,7 @@ def render_markdown(contents: Contents) -> str:
     )
     environment.filters |= {
         "md": escape,
+        "quoted": quoted,
         "spoken": to_markdown,
         "blocks": lambda table: markdown_blocks(table, table.overall),
         "rows": markdown_rows,

@@ -88,14 +88,16 @@ def _rows(file: Path, notes: list[str]) -> pd.DataFrame:
             f"no results in {file.parent}: neither results.sqlite nor {file.name} is there"
         )
     try:
-        lines = list(csv.reader(io.StringIO(file.read_text(encoding="utf-8"), newline="")))
+        text = file.read_text(encoding="utf-8")
+        lines = list(csv.reader(io.StringIO(text, newline="")))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise DikbenchError(f"{file}: not a table of trials: {error}") from None
     header = lines[0] if lines else []
     missing = [name for name in NEEDED if name not in header]
     if missing:
         raise DikbenchError(f"{file}: not a table of trials: it has no column {missing[0]!r}")
-    whole = [line for line in lines[1:] if len(line) == len(header)]
+    ended = lines[1:] if text.endswith("\n") else lines[1:-1]  # a value that was cut may look whole
+    whole = [line for line in ended if len(line) == len(header)]
     rows = pd.DataFrame(whole, columns=header)
     rows = rows[(rows[list(NEEDED)] != "").all(axis=1)]
     if len(rows) < len(lines) - 1:
