@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+import numpy as np
 import pandas as pd
 
 from dikbench.report.words import Law
+from dikbench.statistics.problems import LAW
 
 SAME: Final = 0.01
 """Values closer together than this share of the smaller one are the same."""
@@ -41,13 +43,6 @@ class Lead:
     trials: int
 
 
-def table_of(rows: pd.DataFrame, metric: str, laws: Sequence[Law]) -> pd.DataFrame:
-    """A metric with a row per scenario and seed and a column per law, (cells, laws)."""
-    values = rows.set_index(["scenario", "seed", "formulation", "solver"])[metric]
-    table = values[~values.index.duplicated()].unstack(["formulation", "solver"])
-    return table.reindex(columns=pd.MultiIndex.from_tuples(laws)).dropna(how="all")
-
-
 def lead(rows: pd.DataFrame, metric: str, laws: Sequence[Law]) -> Lead | None:
     """Who leads in a metric of which the smallest value is the best.
 
@@ -62,34 +57,37 @@ def lead(rows: pd.DataFrame, metric: str, laws: Sequence[Law]) -> Lead | None:
     Returns:
         None where the metric is defined for none of them.
     """
-    table = table_of(rows, metric, laws) if laws else pd.DataFrame()
-    table = table.dropna(axis="columns")
+    table = _table(rows, metric, laws)
     if table.empty:
         return None
-    medians = table.median().sort_values(kind="stable")
-    best = medians.index[0]
-    together: list[Law] = [best]
-    apart: dict[Law, int] = {}
-    for law in medians.index[1:]:
-        wins = int(_smaller(table[best], table[law]).sum())
-        told = medians[law] - medians[best] > SAME * abs(medians[best]) + ROUNDING
-        losses = int(_smaller(table[law], table[best]).sum())
-        if told and wins >= MOST * (wins + losses):
-            apart[law] = wins
-        else:
-            together.append(law)
-    place = {law: number for number, law in enumerate(laws)}
-    together.sort(key=place.__getitem__)
+    values, medians = table.to_numpy(), table.median().to_numpy()
+    best = int(medians.argmin())
+    leader = values[:, [best]]
+    wins = (values - leader > SAME * np.abs(leader) + ROUNDING).sum(axis=0)
+    losses = (leader - values > SAME * np.abs(values) + ROUNDING).sum(axis=0)
     value = float(medians[best])
-    if not apart:
-        return Lead(tuple(together), value, None, float("nan"), 0, len(table))
-    second = min(medians[law] for law in apart)
-    alike = [law for law in apart if medians[law] <= second + SAME * abs(second)]
-    runner_up = min(alike, key=place.__getitem__)
+    apart = (medians - value > SAME * abs(value) + ROUNDING) & (wins >= MOST * (wins + losses))
+    names = [law for law in laws if law in table.columns]
+    together = tuple(name for name, told in zip(names, apart, strict=True) if not told)
+    if not apart.any():
+        return Lead(together, value, None, float("nan"), 0, len(table))
+    second = medians[apart].min()
+    runner_up = int(np.argmax(apart & (medians <= second + SAME * abs(second))))
     return Lead(
-        tuple(together), value, runner_up, float(medians[runner_up]), apart[runner_up], len(table)
+        together,
+        value,
+        names[runner_up],
+        float(medians[runner_up]),
+        int(wins[runner_up]),
+        len(table),
     )
 
 
-def _smaller(one: pd.Series, other: pd.Series) -> pd.Series:
-    return (other - one) > SAME * one.abs() + ROUNDING
+def _table(rows: pd.DataFrame, metric: str, laws: Sequence[Law]) -> pd.DataFrame:
+    """A metric with a row per scenario and seed and a column per law for which it is defined."""
+    if not laws:
+        return pd.DataFrame()
+    values = rows.set_index(["scenario", "seed", *LAW])[metric]
+    table = values[~values.index.duplicated()].unstack(LAW)
+    table = table.reindex(columns=pd.MultiIndex.from_tuples(laws))
+    return table.dropna(how="all").dropna(axis="columns")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from math import isnan
 from pathlib import Path
@@ -15,7 +15,6 @@ import jinja2
 from markupsafe import Markup
 
 from dikbench.report.contents import Contents
-from dikbench.report.figures import Figure
 from dikbench.report.spoken import to_html
 from dikbench.report.table import Cell, Column, shown
 
@@ -30,10 +29,10 @@ SECTIONS: Final = (
     ("made", "How it was made"),
 )
 
-MOST_OF_FIGURES: Final = 4_000_000
-"""Bytes of all figures that a page carries; what comes after them stays a file beside it."""
+MOST_OF_FIGURES: Final = 3_000_000
+"""Bytes of all figures that a page carries; what finds no room stays a file beside it."""
 
-_VIEW: Final = re.compile(r'viewBox="0 0 ([\d.]+) ([\d.]+)"')
+_VIEW: Final = re.compile(rb'viewBox="0 0 ([\d.]+) ([\d.]+)"')
 
 
 @dataclass(frozen=True)
@@ -110,28 +109,18 @@ def _td(cell: Cell, column: Column) -> Markup:
     if isnan(cell.value):
         return Markup("<td></td>")
     number = str(int(cell.value)) if column.count else shown(cell.value)
-    classes = " ".join(
-        name
-        for name, applies in (
-            ("best", cell.best),
-            ("unstable", cell.unstable),
-            ("bad", column.key.startswith("fail") and cell.value > 0),
-        )
-        if applies
-    )
-    html = Markup("<td")
-    if classes:
-        html += Markup(' class="{}"').format(classes)
+    failures = column.key.startswith("fail") and cell.value > 0
+    classes = ["best"] * cell.best + ["unstable"] * cell.unstable + ["bad"] * failures
+    attributes = f' class="{" ".join(classes)}"' if classes else ""
     if cell.unstable:
-        html += Markup(' title="these times cannot be trusted"')
-    if cell.has_interval or "inf" in number:
-        html += Markup(' data-sort="{}"').format(number.replace("inf", "Infinity"))
-    html += Markup(">{}").format(number.replace("inf", "\N{INFINITY}"))
+        attributes += ' title="these times cannot be trusted"'
+    bounds = ""
     if cell.has_interval:
-        html += Markup('<span class="bounds">[{}, {}]</span>').format(
-            *(shown(bound).replace("inf", "\N{INFINITY}") for bound in (cell.lower, cell.upper))
-        )
-    return html + Markup("</td>")
+        bounds = f"<small>[{shown(cell.lower)}, {shown(cell.upper)}]</small>"
+    if cell.has_interval or "inf" in number:
+        attributes += f' data-sort="{number.replace("inf", "Infinity")}"'
+    text = (number + bounds).replace("inf", "\N{INFINITY}")
+    return Markup(f"<td{attributes}>{text}</td>")  # numbers and words of ours: nothing to escape
 
 
 def _assets() -> Assets:
@@ -147,29 +136,30 @@ def _hash(text: str) -> str:
 
 
 def _inlined(contents: Contents, folder: Path) -> list[Inlined]:
-    """The figures, as long as there is room for them."""
+    """The figures, drawn as lines where there is room, else as the dots of a PNG beside it."""
     found, left = [], MOST_OF_FIGURES
     for figure in contents.figures:
+        alt = getattr(figure, "title", "") or figure.caption
+        inlined = Inlined(figure.file, figure.caption, alt, "")
         svg = _bytes(folder / figure.file)
-        if svg is None:
-            continue
-        left -= len(svg)
-        found.append(_image(figure, svg if left >= 0 else b""))
+        view = _VIEW.search(svg[:2000])
+        width, height = (round(float(side) * 4 / 3) for side in view.groups()) if view else (0, 0)
+        for kind, content in (
+            ("svg+xml", svg),
+            ("png", _bytes((folder / figure.file).with_suffix(".png"))),
+        ):
+            if content and len(content) <= left:
+                left -= len(content)
+                uri = f"data:image/{kind};base64,{base64.b64encode(content).decode()}"
+                inlined = replace(inlined, uri=uri, width=width, height=height)
+                break
+        found.append(inlined)
     return found
 
 
-def _bytes(file: Path) -> bytes | None:
+def _bytes(file: Path) -> bytes:
+    """The content of a file; none where it is not there."""
     try:
         return file.read_bytes()
     except OSError:
-        return None
-
-
-def _image(figure: Figure, svg: bytes) -> Inlined:
-    alt = getattr(figure, "title", "") or figure.caption
-    if not svg:
-        return Inlined(figure.file, figure.caption, alt, "")
-    uri = f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
-    view = _VIEW.search(svg[:2000].decode("utf-8", "replace"))
-    width, height = (round(float(side) * 4 / 3) for side in view.groups()) if view else (0, 0)
-    return Inlined(figure.file, figure.caption, alt, uri, width, height)
+        return b""

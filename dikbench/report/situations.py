@@ -6,9 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from dikbench.errors import DikbenchError
 from dikbench.oracle import OracleMotion
-from dikbench.registry import make_scenario
+from dikbench.report.built import built
 
 NEAR_LIMIT: Final = 0.05
 """Nearer to a position limit than this [rad] a motion is at the limit."""
@@ -72,8 +71,7 @@ READING_ORDER: Final = (SINGULAR, AT_LIMITS, TOO_FAST, FREE, OUTSIDE, UNREACHABL
 
 def situation_of(scenario: str, seed: int) -> Situation:
     """The situation of a scenario, by the joint motion from which it was built."""
-    try:
-        motion = make_scenario(scenario, seed).motion
-    except DikbenchError:
+    found = built(scenario, seed)
+    if isinstance(found, str):
         return UNKNOWN
-    return next(kind for kind in IN_ORDER if kind.holds(motion))
+    return next(kind for kind in IN_ORDER if kind.holds(found.motion))

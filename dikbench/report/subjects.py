@@ -10,9 +10,9 @@ from typing import Final
 
 import pandas as pd
 
-from dikbench.errors import DikbenchError
 from dikbench.oracle import ORACLE
-from dikbench.registry import make_scenario, plugins
+from dikbench.registry import plugins
+from dikbench.report.built import built
 from dikbench.report.docstring import Docstring, parse_docstring
 from dikbench.report.references import references
 from dikbench.selector import parse_selector
@@ -186,10 +186,9 @@ def _certified(selectors: Iterable[str], seed: int) -> tuple[tuple[Certified, ..
     """Scenarios with their certificates, and what a seed perturbs of the last one."""
     found, variation = [], ""
     for selector in selectors:
-        try:
-            scenario = make_scenario(selector, seed)
-        except DikbenchError as error:
-            found.append(Certified(selector, (), str(error)))
+        scenario = built(selector, seed)
+        if isinstance(scenario, str):
+            found.append(Certified(selector, (), scenario))
         else:
             claims = tuple(str(claim) for claim in scenario.certificate.claims)
             found.append(Certified(selector, claims))

@@ -216,7 +216,7 @@ def test_text_can_be_read_in_the_light_and_in_the_dark(page: Any, scheme: str) -
           }
           return "rgb(255, 255, 255)";
         };
-        const texts = "p, dt, dd, td, th, a, summary, code, pre, .quiet, .bounds";
+        const texts = "p, dt, dd, td, th, a, summary, code, pre, .quiet, small";
         const of = (e) => [getComputedStyle(e).color, ground(e), e.outerHTML];
         return Array.from(document.querySelectorAll(texts), of);
         """
