@@ -48,14 +48,10 @@ def _block(table: Table, block: Block) -> str:
     columns = [
         ["law", *(_name(row) for row in top)],
         ["failed", *(f"{row.cells[1].value:.0f}/{row.cells[2].value:.0f}" for row in top)],
-        *(
-            [
-                table.columns[place].heading,
-                *(_text(table.columns[place], r.cells[place]) for r in top),
-            ]
-            for place in numbers
-        ),
     ]
+    for place in numbers:
+        column = table.columns[place]
+        columns.append([column.heading, *(_text(column, row.cells[place]) for row in top)])
     lines = [block.setting] if block.setting else []
     lines += _fitting(columns)
     if len(rows) > ROWS:
@@ -83,7 +79,7 @@ def _fitting(columns: Sequence[Sequence[str]]) -> list[str]:
             lines = [
                 f"{line}  {text.rjust(longest)}" for line, text in zip(lines, whole, strict=True)
             ]
-    return [line.rstrip() for line in lines]
+    return [line.rstrip() for line in lines if line.strip()]
 
 
 def _name(row: Row) -> str:

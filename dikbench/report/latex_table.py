@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from math import isnan
+from textwrap import wrap
 from unicodedata import decomposition
 
 from dikbench.report.table import ALL, Block, Cell, Column, Table, shown
+
+HEADING = 12
+"""Characters to a line of a heading, unless a word is longer."""
 
 _ESCAPES = str.maketrans(
     {
@@ -59,14 +63,15 @@ def to_latex_per_family(table: Table) -> str:
     parts = []
     for family in dict.fromkeys(block.family for block in table.blocks if block.family != ALL):
         blocks = [block for block in table.blocks if block.family == family]
-        parts.append(f"\\paragraph{{{escape(family)}}}\n\n{_tabular(table, blocks)}\n")
-    return "\n\\bigskip\n".join(parts)
+        heading = f"\\noindent\\textbf{{{escape(family)}}}\\par\\smallskip"
+        parts.append(f"{heading}\n\\noindent\n{_tabular(table, blocks)}\n\\par\\bigskip\n")
+    return "\n".join(parts)
 
 
 def _tabular(table: Table, blocks: Iterable[Block]) -> str:
     r"""A tabular; best in bold, what cannot be trusted in grey (\textcolor, xcolor or color)."""
     width = 2 + len(table.columns)
-    headings = ["formulation", "solver", *(escape(column.heading) for column in table.columns)]
+    headings = ["formulation", "solver", *(_heading(column.heading) for column in table.columns)]
     lines = [
         f"\\begin{{tabular}}{{ll{'r' * len(table.columns)}}}",
         r"\toprule",
@@ -82,6 +87,13 @@ def _tabular(table: Table, blocks: Iterable[Block]) -> str:
     return "\n".join([*lines, r"\bottomrule", r"\end{tabular}"])
 
 
+def _heading(text: str) -> str:
+    """A heading in short lines, one above the other."""
+    lines = [escape(line) for line in wrap(text, HEADING)]
+    stacked = r" \\ ".join(lines)
+    return f"\\shortstack[r]{{{stacked}}}"
+
+
 def _line(cells: Iterable[str]) -> str:
     return " & ".join(cells) + r" \\"
 
@@ -91,7 +103,9 @@ def _cell(column: Column, cell: Cell) -> str:
         return ""
     if column.count:
         return str(int(cell.value))
-    text = f"\\textbf{{{_number(cell.value)}}}" if cell.best else _number(cell.value)
+    text = _number(cell.value)
+    if cell.best:
+        text = f"\\textbf{{\\boldmath{text}}}" if "$" in text else f"\\textbf{{{text}}}"
     if cell.has_interval:
         text += f" {{\\scriptsize[{_number(cell.lower)}, {_number(cell.upper)}]}}"
     return f"\\textcolor{{gray}}{{{text}}}" if cell.unstable else text

@@ -2,30 +2,48 @@
 
 from __future__ import annotations
 
+import re
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 # Okabe & Ito 2008, without the yellow that paper swallows.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000", "#999999")
 DASHES = ("-", "--", ":", "-.")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")
 
+WIDTH: Final = 7.2
+"""Of a figure [in]: two columns of a paper."""
+
+RESOLUTION: Final = 200
+"""Of a PNG, and of what is an image in an SVG [dots per inch]."""
+
+LONGEST_NAME: Final = 26
+"""Characters of a name that find room."""
+
 
 @contextmanager
 def style() -> Iterator[None]:
     """Draw without a screen, in the project's style."""
     settings: dict[str, Any] = {
-        "font.size": 9,
+        "font.size": 8,
+        "font.sans-serif": ["DejaVu Sans", "Verdana"],
+        "text.parse_math": False,  # a name may hold a dollar sign
         "axes.grid": True,
+        "axes.axisbelow": True,
         "axes.spines.top": False,
         "axes.spines.right": False,
+        "axes.titlesize": 7.5,
+        "xtick.labelsize": 7,
+        "ytick.labelsize": 7,
         "grid.alpha": 0.25,
-        "legend.fontsize": 7.5,
+        "legend.fontsize": 7,
         "legend.frameon": False,
         "lines.linewidth": 1.3,
         "figure.constrained_layout.use": True,
@@ -33,7 +51,9 @@ def style() -> Iterator[None]:
         "svg.fonttype": "none",
     }
     backend = mpl.get_backend()
-    with mpl.rc_context(settings):
+    with mpl.rc_context(settings), warnings.catch_warnings():
+        # A browser has the characters that matplotlib's font lacks.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font")
         plt.switch_backend("agg")
         try:
             yield
@@ -46,7 +66,7 @@ def look(number: int) -> dict[str, Any]:
     return {
         "color": COLOURS[number % len(COLOURS)],
         "linestyle": DASHES[number % len(DASHES)],
-        "linewidth": max(1.0, 3.2 - 0.35 * number),
+        "linewidth": max(1.0, 2.8 - 0.4 * number),
     }
 
 
@@ -63,12 +83,38 @@ def law_name(formulation: str, solver: str) -> str:
     return formulation if solver == "none" else f"{formulation}, {solver}"
 
 
+def short(name: str, most: int = LONGEST_NAME) -> str:
+    """A name that fits: characters that cannot be written replaced, a long one cut in its middle."""
+    written = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in name)
+    if len(written) <= most:
+        return written
+    tail = most // 2
+    return f"{written[: most - tail - 1]}\N{HORIZONTAL ELLIPSIS}{written[-tail:]}"
+
+
+def file_name(*parts: object) -> str:
+    """A name for a file from words of which some are the user's."""
+    words = (re.sub(r"[^A-Za-z0-9_-]+", "-", str(part)).strip("-")[:40] for part in parts)
+    return "_".join(word for word in words if word)
+
+
+def logarithmic(axis: Any, which: str) -> None:
+    """Make an axis logarithmic, with plain numbers at its decades."""
+    getattr(axis, f"set_{which}scale")("log")
+    part = getattr(axis, f"{which}axis")
+    part.set_major_locator(LogLocator(numticks=6))
+    part.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    part.set_minor_formatter(NullFormatter())
+
+
 def save(figure: Any, folder: Path, name: str) -> str:
-    """Write a figure as SVG and return its file name."""
-    file = f"{name}.svg"
-    figure.savefig(folder / file, metadata={"Date": None})
+    """Write a figure as SVG and as PNG, and return the file name of the SVG."""
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # laid out once, for both
+    figure.savefig(folder / f"{name}.svg", metadata={"Date": None}, dpi=RESOLUTION)
+    figure.savefig(folder / f"{name}.png", dpi=RESOLUTION)
     plt.close(figure)
-    return file
+    return f"{name}.svg"
 
 
 def names_in_order(values: Sequence[str]) -> list[str]:

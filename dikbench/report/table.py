@@ -22,7 +22,7 @@ def shown(value: float) -> str:
     if abs(value) < ROUNDING:
         return "0"
     text = f"{value:.{DIGITS}g}"
-    return f"{float(text):.0f}" if 1e3 <= abs(value) < 1e6 else text
+    return f"{float(text):.0f}" if 1e3 <= abs(float(text)) < 1e6 else text
 
 
 @dataclass(frozen=True)

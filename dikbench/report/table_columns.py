@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
-from dikbench.array import Array, Indices, Mask
+from dikbench.array import Array, Mask
 from dikbench.metrics import METRICS
 from dikbench.oracle import ORACLE
 from dikbench.report.table import DIGITS, Cell, Column
@@ -20,7 +20,7 @@ from dikbench.statistics.problems import ProblemMatrix
 from dikbench.statistics.shifted_mean import shift_near_median, shifted_geometric_mean
 
 NEGLIGIBLE = 1e-6
-"""What is smaller than this [m, rad, rad/s, a share] is as good as nothing when laws are compared."""
+"""What is smaller than this [m, rad, rad/s, a share] is as good as 0 when laws are compared."""
 
 _AVERAGES = (Statistic.GEOMETRIC_MEAN, Statistic.MEAN)
 
@@ -51,8 +51,8 @@ class Sample:
     """The trials of a block.
 
     Attributes:
-        rows: of trials, with the column `family` and failures at their worst; a law has one per
-            problem.
+        rows: of trials, with the columns `family` and `failed`, and failures at their worst; a
+            law has one per problem.
         layout: where each stands in a matrix of problems x laws.
         weights: the resamples of its problems.
         unstable: whether the numbers of each law are times that cannot be trusted.
@@ -81,7 +81,7 @@ class Sample:
         intervals = np.full((len(values), 2), nan)
         if column.interval:
             intervals = self._intervals(matrix, column.shift)
-        best = self._best(values, np.sum(~np.isnan(matrix), axis=0), column.better)
+        best = self._best(values, self._competes(matrix), column.better)
         return [
             Cell(value, float(low), float(high), first, bool(unstable))
             for value, (low, high), first, unstable in zip(
@@ -96,24 +96,28 @@ class Sample:
         bounds: Array = shift * np.expm1(logarithms)
         return bounds
 
-    def _best(self, values: Sequence[float], rests_on: Indices, better: str | None) -> list[bool]:
-        """Who is the best, to what counts; nobody where all are equally good.
+    def _competes(self, matrix: Array) -> Mask:
+        """Whether each law has a number wherever one was measured of any law that came through.
 
-        A law competes only with a number that rests on as many trials as anybody's: the average
-        over the scenarios that it survived is no win. The oracle is no law.
+        The average over the scenarios that a law survived is no win. The oracle is no law.
         """
         law = (self.layout.laws["formulation"] != ORACLE).to_numpy()
-        most = max(rests_on[law], default=0)
-        compete = law & (rests_on == most) & ~np.isnan(values)
+        came_through = self.layout.fill(1 - self.rows["failed"].to_numpy(dtype=float), 0.0) > 0
+        has = ~np.isnan(matrix)
+        asked = (has & came_through)[:, law].any(axis=1, keepdims=True)
+        competes: Mask = law & (has | ~asked).all(axis=0)
+        return competes
+
+    @staticmethod
+    def _best(values: Sequence[float], competes: Mask, better: str | None) -> list[bool]:
+        """Which laws are the best, to what counts; none where all are equally good."""
         merits = [_merit(value) for value in values]
-        competing = {merit for merit, competes in zip(merits, compete, strict=True) if competes}
+        competing = {merit for merit, one in zip(merits, competes, strict=True) if one}
+        competing = {merit for merit in competing if not isnan(merit)}
         if better is None or len(competing) < 2:
             return [False] * len(values)
         first = min(competing) if better == "low" else max(competing)
-        return [
-            bool(competes) and merit == first
-            for merit, competes in zip(merits, compete, strict=True)
-        ]
+        return [bool(one) and merit == first for merit, one in zip(merits, competes, strict=True)]
 
 
 def _merit(value: float) -> float:

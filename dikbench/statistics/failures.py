@@ -5,7 +5,7 @@ A failed trial is never dropped and never turned into a time:
 - it stands in the failure rate, which comes first in every table;
 - in an average it takes its metric's `worst` value where that is finite (pi for an angle, 1 for a
   share of violating steps, 0 for a share of success); where it is infinite an average cannot carry
-  it, and the average then rests on fewer trials, which excludes its law from being marked best;
+  it and leaves it out, and such an average is not compared with those of other laws;
 - in an extreme (the worst over scenarios) it takes the `worst` value, infinite or not;
 - in a performance or data profile it is a problem that was not solved: an infinite ratio.
 

@@ -44,6 +44,8 @@ def draw_weights(
     for place, (family, scenario) in enumerate(zip(families, scenarios, strict=True)):
         tree.setdefault(family, {}).setdefault(scenario, []).append(place)
     weights = np.empty((resamples, len(families)))
+    if not tree:
+        return weights
     drawn = _equal_multinomial(random, np.full(resamples, len(tree)), len(tree))
     for times, members in zip(drawn.T, tree.values(), strict=True):
         inside = _equal_multinomial(random, times * len(members), len(members))

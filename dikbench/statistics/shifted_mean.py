@@ -29,7 +29,8 @@ def shifted_geometric_mean(values: Array, shift: float) -> float:
 def shift_near_median(values: Array) -> float:
     """The median to one significant digit, as a round shift that can be stated in a heading.
 
-    Where half of the values are zero it is the median of the positive ones; 1 where none is.
+    Where more than half of the values are zero it is the median of the positive ones, and 1 where
+    all are.
 
     Args:
         values: numbers >= 0; NaN and infinities are passed over.

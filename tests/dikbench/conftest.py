@@ -1,0 +1,25 @@
+"""What several test modules look at."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from dikbench.report.page import write_report
+from dikbench.run.runner import RunSettings, run_study
+from dikbench.study import Selection, load_study, select
+
+
+@pytest.fixture(scope="session")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a small run with every kind of law, a skipped pair and a path-indexed run."""
+    out = tmp_path_factory.mktemp("run") / "out"
+    selection = Selection(
+        scenarios=("reach", "near-miss[miss=0.02]"), references=("time", "path"), seeds=(0, 1)
+    )
+    run_study(
+        select(load_study("smoke"), selection, named=True), out, RunSettings(jobs=2), "a test"
+    )
+    write_report(out)
+    return out
