@@ -11,7 +11,7 @@ from typing import Any
 import pandas as pd
 
 from dikbench.metrics import METRICS
-from dikbench.report.figures import Figure
+from dikbench.report.figure import Figure
 from dikbench.report.limitations import Limitation, limitations, missing
 from dikbench.report.reading import Results
 from dikbench.report.return_codes import return_codes

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -12,23 +11,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
+from dikbench.report.figure import Figure
 from dikbench.report.style import law_name, look, marker, names_in_order, save, style
 from dikbench.report.sweeps import Sweep, sweeps
 from dikbench.report.time_series import draw_time_series
 from dikbench.run.results import ResultsFolder
-
-
-@dataclass(frozen=True)
-class Figure:
-    """A figure that was drawn.
-
-    Attributes:
-        file: its file name in the folder of figures.
-        caption: what it shows, in a sentence or two.
-    """
-
-    file: str
-    caption: str
 
 
 def draw_figures(

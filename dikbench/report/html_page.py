@@ -139,7 +139,7 @@ def _inlined(contents: Contents, folder: Path) -> list[Inlined]:
     """The figures, drawn as lines where there is room, else as the dots of a PNG beside it."""
     found, left = [], MOST_OF_FIGURES
     for figure in contents.figures:
-        alt = getattr(figure, "title", "") or figure.caption
+        alt = figure.title or figure.caption
         inlined = Inlined(figure.file, figure.caption, alt, "")
         svg = _bytes(folder / figure.file)
         view = _VIEW.search(svg[:2000])
