@@ -56,7 +56,7 @@ def parse_docstring(text: str) -> Docstring:
             titled[title[1]] = " ".join(part[title.end() :].split()).rstrip(".")
         elif all(line.startswith("    ") for line in part.split("\n")) and part:
             paragraphs.append(Paragraph(inspect.cleandoc(part), program=True))
-        elif part.strip() and not part.startswith(("Raises:", "Returns:")):
+        elif part.strip():
             paragraphs.append(Paragraph(" ".join(part.split()), program=False))
     return Docstring(first.strip(), tuple(paragraphs), entries, titled)
 

@@ -15,6 +15,7 @@ from dikbench.report.words import listed, number, quoted, several
 from dikbench.run.stability import STABLE
 from dikbench.selector import parse_selector
 from dikbench.solvers.catalogue import BACK_ENDS, is_installed
+from dikbench.statistics.failures import SKIPPED, has_failed
 from dikbench.statistics.problems import LAW
 
 WORTH_SAYING: Final = 0.01
@@ -161,31 +162,30 @@ def _ways(trials: pd.DataFrame) -> list[Limitation]:
 
 
 def _broken(trials: pd.DataFrame) -> list[Limitation]:
-    """Cells that were skipped and trials that failed, each with its reason."""
+    """Cells that were skipped and trials that failed, a case for each reason."""
     found = []
-    skipped = trials[trials["status"] == "skipped"]
+    skipped = trials[trials["status"] == SKIPPED]
     if len(skipped):
-        cases = tuple(
-            f"{_law(formulation, solver)}: {several(count, 'cell')} skipped: {message}."
-            for (formulation, solver, message), count in _counted(skipped, [*LAW, "message"])
-        )
-        found.append(Limitation(f"{several(len(skipped), 'cell')} could not run.", cases))
-    failed = trials[~trials["status"].isin(["ok", "skipped"])]
+        text = f"{several(len(skipped), 'cell')} could not run."
+        found.append(Limitation(text, _reasons(skipped, "cell")))
+    failed = trials[has_failed(trials)]
     if len(failed):
-        cases = tuple(
-            f"{_law(formulation, solver)}: {several(count, 'trial')} {status}: {message}."
-            for (formulation, solver, status, message), count in _counted(
-                failed, [*LAW, "status", "message"]
-            )
+        text = (
+            f"{several(len(failed), 'trial')} failed. Tables count them first; a failed trial "
+            "takes the worst value that a metric has."
         )
-        found.append(
-            Limitation(
-                f"{several(len(failed), 'trial')} failed; tables count them, and medians are "
-                "without them where no other is said.",
-                cases,
-            )
-        )
+        found.append(Limitation(text, _reasons(failed, "trial")))
     return found
+
+
+def _reasons(rows: pd.DataFrame, what: str) -> tuple[str, ...]:
+    """How often each status and message occurs, and with which laws."""
+    cases = []
+    for (status, message), part in rows.groupby(["status", "message"], sort=False):
+        laws = part[LAW].drop_duplicates().itertuples(index=False, name=None)
+        names = listed([_law(*law) for law in laws])
+        cases.append(f"{several(len(part), what)} {status}: {message} ({names}).")
+    return tuple(cases)
 
 
 def _steps(trials: pd.DataFrame) -> list[Limitation]:
@@ -222,7 +222,7 @@ def _steps(trials: pd.DataFrame) -> list[Limitation]:
 
 def _not_run(trials: pd.DataFrame) -> list[Limitation]:
     """What is registered and no part of the run."""
-    ran = trials[trials["status"] != "skipped"]
+    ran = trials[trials["status"] != SKIPPED]
     axes = (
         ("laws", plugins("formulation"), "formulation"),
         ("scenario families", plugins("scenario"), "scenario"),
