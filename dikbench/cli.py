@@ -191,7 +191,7 @@ def run(
     except Interrupted as stopped:
         click.echo(f"\nstopped: {stopped}; to continue: {command}", err=True)
         sys.exit(130)
-    click.echo(f"\n{write_report(folder)}\n\n{folder / 'report.md'}")
+    click.echo(f"\n{write_report(folder)}\n\n{folder / 'report.html'}")
 
 
 @commands.command()
@@ -214,6 +214,19 @@ def time(study: str | None, out: Path | None, **axes: Any) -> None:
         click.echo(f"\nstopped: {stopped}", err=True)
         sys.exit(130)
     click.echo(f"\n{write_times(folder)}\n\n{folder / 'timing.csv'}")
+
+
+@commands.command()
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path, file_okay=False))
+@one_line_errors
+def report(folder: Path) -> None:
+    """Remake the tables, figures and report of a results folder, from what is in it.
+
+    A committed folder, which has trials.csv and manifest.json but no store, will do.
+    """
+    from dikbench.report.page import write_report
+
+    click.echo(f"\n{write_report(folder)}\n\n{folder / 'report.html'}")
 
 
 @commands.command()

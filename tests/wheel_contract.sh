@@ -25,3 +25,4 @@ venv/bin/dikbench list
 venv/bin/pytest --import-mode=importlib test_contract.py
 venv/bin/dikbench run smoke --scenario reach --out runs/wheel > /dev/null
 test -s runs/wheel/report.md
+test -s runs/wheel/report.html

@@ -214,6 +214,14 @@ class Store:
                 "UPDATE runs SET manifest = ? WHERE id = (SELECT MAX(id) FROM runs)", [noted]
             )
 
+    def environments(self) -> list[dict[str, Any]]:
+        """The descriptions of the processes that made the rows of trials that are shown."""
+        rows = self._rows(
+            "SELECT description FROM environments WHERE id IN "
+            "(SELECT environment FROM trials WHERE NOT superseded)"
+        )
+        return [json.loads(row[0]) for row in rows]
+
     def close_neatly(self) -> None:
         """Fold the write-ahead log into the file."""
         with self._guarded():

@@ -1,0 +1,86 @@
+"""Numbers and names in sentences."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Final
+
+import pandas as pd
+
+Law = tuple[str, str]
+"""A formulation and its solver."""
+
+FEW: Final = 6
+"""More names than this are counted, not listed."""
+
+
+def number(value: float) -> str:
+    """Three significant digits, no exponent where it can be read without; rounding is 0."""
+    if not math.isfinite(value):
+        return str(value)
+    if abs(value) < 1e-9:
+        return "0"
+    return f"{value:.3g}" if 1e-4 <= abs(value) < 999.5 else _far(value)
+
+
+def _far(value: float) -> str:
+    return f"{value:.2e}" if abs(value) < 1e-4 or abs(value) >= 1e6 else f"{value:.0f}"
+
+
+def millimetres(metres: float) -> str:
+    """A length."""
+    return f"{number(1e3 * metres)} mm"
+
+
+def degrees(radians: float) -> str:
+    """An angle."""
+    return f"{number(math.degrees(radians))} deg"
+
+
+def several(count: int, what: str) -> str:
+    """A count and its noun."""
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
+
+
+def listed(names: Sequence[str], most: int | None = FEW) -> str:
+    """Names in a sentence: `a`, `b` and 5 more."""
+    shown = list(names if most is None or len(names) <= most + 1 else names[:most])
+    if len(shown) < len(names):
+        return f"{', '.join(shown)} and {len(names) - len(shown)} more"
+    return " and ".join([", ".join(shown[:-1]), shown[-1]]) if len(shown) > 1 else "".join(shown)
+
+
+def quoted(name: str) -> str:
+    """A name between backticks."""
+    return f"`{' '.join(name.split()).replace('`', chr(39))}`"
+
+
+class Names:
+    """How laws with their solvers are called in the sentences of one run.
+
+    Args:
+        rows: every trial of the run.
+    """
+
+    def __init__(self, rows: pd.DataFrame) -> None:
+        pairs = rows[["formulation", "solver"]].drop_duplicates()
+        self._solvers = pairs.groupby("formulation", sort=False)["solver"].agg(list).to_dict()
+
+    def of(self, laws: Iterable[Law]) -> str:
+        """The laws in words: `dls`, `qp` (all 8 solvers) and `lp-alpha` (daqp)."""
+        groups: dict[str, list[str]] = {}
+        for formulation, solver in laws:
+            groups.setdefault(formulation, []).append(solver)
+        return listed([self._named(*group) for group in groups.items()])
+
+    def _named(self, formulation: str, solvers: list[str]) -> str:
+        name, every = quoted(formulation), self._solvers[formulation]
+        if len(every) == 1:
+            return name
+        others = [solver for solver in every if solver not in solvers]
+        if not others:
+            return f"{name} (all {len(every)} solvers)"
+        if len(others) < len(solvers):
+            return f"{name} (all solvers but {listed([quoted(solver) for solver in others])})"
+        return f"{name} ({listed([quoted(solver) for solver in solvers])})"

@@ -1,0 +1,93 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from dikbench.report.limitations import in_plan, limitations, missing
+
+MakeRows = Callable[..., pd.DataFrame]
+STUDY: dict[str, Any] = {"study": {"name": "a"}}
+
+
+def told(rows: pd.DataFrame, manifest: dict[str, Any] = STUDY) -> str:
+    """Every sentence of the limitations."""
+    found = limitations(rows, manifest, ["A note."])
+    return "\n".join(line for each in found for line in (each.text, *each.cases))
+
+
+def test_each_limitation_is_said_where_it_applies_and_only_there(make_rows: MakeRows) -> None:
+    """A faultless run has none of those that a faulty one has."""
+    faults: dict[str, dict[str, Any]] = {
+        "1 trial failed": {"status": ["timeout", "ok"], "message": "not finished after 4 s"},
+        "1 trial timeout: not finished after 4 s (`a`).": {
+            "status": ["timeout", "ok"], "message": "not finished after 4 s",
+        },
+        "2 cells could not run": {"status": "skipped", "message": "it cannot"},
+        "2 cells skipped: it cannot (`a`).": {"status": "skipped", "message": "it cannot"},
+        "`a`: in up to 20 % of a run's steps.": {"not_verified_share": [0.2, 0.0]},
+        "without a feasible point": {"infeasible_share": 0.2},
+        "Feasible programs without an answer": {"solver_failed_share": 0.2},
+        "Acceleration bounds that were given up": {"relaxed_share": 0.2},
+        "1 are not stable": {
+            "law_time_median_us": 1.0, "timing_verdict": ["drift: a round", "stable"],
+        },
+        "`a` on `reach`: drift: a round.": {
+            "law_time_median_us": 1.0, "timing_verdict": ["drift: a round", "stable"],
+        },
+    }  # fmt: skip
+    scenarios = ("reach", "near-miss")
+    faultless = told(make_rows({"a": {}, "b": {}}, scenarios))
+    for sentence, fault in faults.items():
+        assert sentence not in faultless
+        assert sentence in told(make_rows({"a": fault, "b": {}}, scenarios)), sentence
+
+
+def test_one_seed_no_times_and_one_way_of_running_are_said(make_rows: MakeRows) -> None:
+    """More seeds, times and the other plant and reference mode take their sentences away."""
+    one = make_rows({"pinv": {}})
+    for sentence in (
+        "There is one seed (0)", "No times were taken", "moved on with the clock",
+        "The plant `saturating`.", "The reference `path`.", "The oracle, a measure", "A note.",
+    ):  # fmt: skip
+        assert sentence in told(one)
+    timed = {"law_time_median_us": 1.0, "timing_verdict": "stable"}
+    more = [
+        make_rows({"pinv": timed, "oracle": {}}, seeds=(0, 1), plant=plant, reference=reference)
+        for plant in ("ideal", "saturating")
+        for reference in ("time", "path")
+    ]
+    everything = told(pd.concat(more))
+    for sentence in ("one seed", "No times", "with the clock", "The plant", "The reference `"):
+        assert sentence not in everything
+    assert "The oracle, a measure" not in everything
+
+
+def test_what_was_not_run_is_what_is_registered_without_what_was(make_rows: MakeRows) -> None:
+    """A law that ran is not listed among those of which nothing is said."""
+    text = told(make_rows({"pinv[after=clip]": {}}))
+    line = next(line for line in text.split("\n") if " laws: " in line)
+    assert "`dls`" in line
+    assert "`pinv`" not in line
+
+
+def test_trials_that_are_missing_are_counted(make_rows: MakeRows) -> None:
+    """Planned trials without a row are missing; rows that the study does not ask for are others."""
+    rows = make_rows({"pinv": {}, ("qp", "daqp"): {}, "dls": {}}, seeds=(0, 1))
+    study = {
+        "scenarios": ["reach"], "plants": ["ideal"], "references": ["time"], "seeds": [0, 1],
+        "cells": [{"formulations": ["pinv", "qp"], "solvers": ["daqp"]}],
+    }  # fmt: skip
+    manifest = {"study": study, "trials": 7}
+    assert in_plan(rows, study).sum() == 4
+    assert missing(rows, manifest) == 3
+    assert "3 of 7 trials are missing" in told(rows, manifest)
+    assert "2 rows of earlier runs" in told(rows, manifest)
+
+
+@pytest.mark.parametrize("seed", [5, 0])
+def test_the_seed_is_named(make_rows: MakeRows, seed: int) -> None:
+    """Which seed it was stands in the sentence."""
+    assert f"There is one seed ({seed})" in told(make_rows({"pinv": {}}, seeds=(seed,)))
