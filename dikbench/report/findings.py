@@ -9,7 +9,7 @@ from typing import Final
 
 import pandas as pd
 
-from dikbench.metrics import NEGLIGIBLE
+from dikbench.metrics.metric import NEGLIGIBLE
 from dikbench.report.comparison import SAME, Lead, lead
 from dikbench.report.words import Law, Names, degrees, listed, millimetres, number, several
 from dikbench.run.stability import DRIFT, STABLE
