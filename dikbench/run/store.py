@@ -51,6 +51,10 @@ and shown after it. It is `superseded`, kept but not shown, where the plan has a
 selectors whose law or scenario has another source."""
 
 
+class OtherVersion(DikbenchError):
+    """A store that a dikbench with other tables or metrics wrote."""
+
+
 class Store:
     """An open store; one process writes, committing every row, others may read."""
 
@@ -227,13 +231,13 @@ class Store:
         except sqlite3.DatabaseError as error:
             raise DikbenchError(f"store {self.path}: not a store of dikbench: {error}") from None
         if found.get("schema") != str(SCHEMA):
-            raise DikbenchError(
+            raise OtherVersion(
                 f"store {self.path}: schema version {found.get('schema')!r} is not known; this "
                 f"dikbench reads version {SCHEMA}"
             )
         missing = set(NUMBERS) - set(columns)
         if missing:
-            raise DikbenchError(
+            raise OtherVersion(
                 f"store {self.path}: written by a dikbench with other metrics (it lacks "
                 f"{min(missing)!r}); choose another folder"
             )
