@@ -8,12 +8,17 @@ from typing import Any
 import jinja2
 import pandas as pd
 
+from dikbench.report.console import to_text
 from dikbench.report.figures import draw_figures
+from dikbench.report.markdown import markdown_blocks, markdown_rows
 from dikbench.report.return_codes import TITLE as RETURN_CODES
 from dikbench.report.return_codes import return_codes
-from dikbench.report.tables import ALL, LAW, TABLES, make_table, markdown_rows, to_markdown
+from dikbench.report.table_files import write_table
+from dikbench.report.table_kinds import KINDS, TIMING
+from dikbench.report.tables import make_table
 from dikbench.run.results import ResultsFolder
 from dikbench.run.stability import STABLE
+from dikbench.statistics.problems import LAW
 
 WORTH_SAYING = 0.01
 """A share of steps above this is remarked upon."""
@@ -30,7 +35,13 @@ def write_report(path: Path) -> str:
     """
     folder = ResultsFolder(path)
     trials, manifest = folder.read()
-    shown = [_written(path, name, trials) for name in TABLES]
+    tables = [make_table(kind, trials) for kind in KINDS]
+    for table in tables:
+        write_table(table, path / "tables")
+    shown = [
+        {"name": table.name, "title": table.title, "rows": markdown_blocks(table, table.overall)}
+        for table in tables
+    ]
     codes = return_codes(trials)
     codes.to_csv(path / "tables" / "return_codes.csv", index=False)
     text = markdown_rows(codes) if len(codes) else "Nothing was solved."
@@ -56,7 +67,7 @@ def write_report(path: Path) -> str:
         remarks=told,
     )
     (path / "report.md").write_text(text)
-    printed = [f"{table['title']}\n\n{table['rows']}\n" for table in shown]
+    printed = [*map(to_text, tables), f"{RETURN_CODES}\n\n{shown[-1]['rows']}\n"]
     counts = f"{len(trials)} trials, {failed} failed, {skipped} skipped.\n"
     return "\n".join([*printed, counts, *(f"- {remark}" for remark in told)])
 
@@ -72,25 +83,14 @@ def write_times(path: Path) -> str:
     """
     with ResultsFolder(path).open_store() as store:
         times = store.times()
-    shown = _written(path, "timing", times.assign(status="ok"))
+    table = make_table(TIMING, times.assign(status="ok"))
+    write_table(table, path / "tables")
     unstable = times[times["timing_verdict"] != STABLE]
     told = [
         f"- {row.formulation} with {row.solver} on {row.scenario}: {row.timing_verdict}."
         for row in unstable.itertuples()
     ]
-    return "\n".join([f"{shown['title']}\n\n{shown['rows']}\n", *told])
-
-
-def _written(path: Path, name: str, trials: pd.DataFrame) -> dict[str, str]:
-    """Write one of the tables, and give its part over all families."""
-    kind = TABLES[name]
-    table = make_table(kind, trials)
-    (path / "tables").mkdir(exist_ok=True)
-    table.to_csv(path / "tables" / f"{name}.csv", index=False)
-    (path / "tables" / f"{name}.md").write_text(to_markdown(kind, table))
-    rows = table[table["family"] == ALL].drop(columns="family")
-    text = markdown_rows(rows) if len(rows) else "Nothing was measured."
-    return {"name": name, "title": kind.title, "rows": text}
+    return "\n".join([to_text(table), *told])
 
 
 def remarks(trials: pd.DataFrame) -> list[str]:

@@ -1,0 +1,137 @@
+"""A table as every renderer sees it: Markdown, CSV, LaTeX, HTML and the console."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isnan, nan
+from typing import Literal
+
+ALL = "all"
+"""Stands for all families."""
+
+DIGITS = 3
+"""Significant digits that are shown; what agrees in them is equally good."""
+
+ROUNDING = 1e-9
+"""What is smaller than this is rounding, and shown as 0 (CSV keeps it)."""
+
+
+def shown(value: float) -> str:
+    """A number as it is read: `DIGITS` significant digits, 0 where it is rounding."""
+    if abs(value) < ROUNDING:
+        return "0"
+    text = f"{value:.{DIGITS}g}"
+    return f"{float(text):.0f}" if 1e3 <= abs(value) < 1e6 else text
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of numbers.
+
+    Attributes:
+        key: its name in CSV, an identifier with the unit in it; the bounds of its interval stand
+            beside it as `key_lower` and `key_upper`.
+        heading: what stands above it, with the unit in brackets.
+        definition: what the number is, in a line: the statistic, its shift, the metric.
+        better: which direction is better; None where neither is (a count of trials).
+        interval: whether its cells carry an interval.
+        count: whether its cells are whole numbers.
+        shift: of a shifted geometric mean, in the unit of the column; NaN where it is none.
+    """
+
+    key: str
+    heading: str
+    definition: str
+    better: Literal["low", "high"] | None = None
+    interval: bool = False
+    count: bool = False
+    shift: float = nan
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A number in a table.
+
+    Attributes:
+        value: the number; NaN where nothing was measured, infinite where a failed trial's is.
+        lower: lower end of its 95 % interval; NaN where there is none.
+        upper: upper end of it.
+        best: whether no other law of the block has a better one (several may be equally good).
+        unstable: whether it rests on times that cannot be trusted: to be greyed.
+    """
+
+    value: float
+    lower: float = nan
+    upper: float = nan
+    best: bool = False
+    unstable: bool = False
+
+    @property
+    def has_interval(self) -> bool:
+        """Whether there is an interval that, as it is shown, is more than the value itself."""
+        bounds = (self.lower, self.upper)
+        return not any(map(isnan, bounds)) and {*map(shown, bounds)} != {shown(self.value)}
+
+
+@dataclass(frozen=True)
+class Row:
+    """What a law with its solver achieved.
+
+    Attributes:
+        formulation: selector of the law, as the user wrote it: escape it.
+        solver: selector of the solver, or `none`.
+        cells: one per column of the table.
+    """
+
+    formulation: str
+    solver: str
+    cells: tuple[Cell, ...]
+
+
+@dataclass(frozen=True)
+class Block:
+    """Rows that may be compared with one another: same scenarios, plant and reference mode.
+
+    Attributes:
+        family: of the scenarios, or `ALL`.
+        plant: selector of the plant; None where the table does not tell plants apart (times).
+        reference: `time` or `path`; None likewise.
+        rows: one per law and solver, in the order of the trials.
+    """
+
+    family: str
+    plant: str | None
+    reference: str | None
+    rows: tuple[Row, ...]
+
+    @property
+    def setting(self) -> str:
+        """Plant and reference mode in words; empty for times."""
+        if self.plant is None:
+            return ""
+        return f"{self.plant} plant, {self.reference}-indexed reference"
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table: the blocks over all families first, then those of each family.
+
+    Attributes:
+        name: of its files.
+        title: one line above it.
+        columns: what the cells of a row are, failures first.
+        blocks: its parts, each to be headed by its family, plant and reference mode.
+        notes: sentences that belong under it: how the numbers were taken.
+    """
+
+    name: str
+    title: str
+    columns: tuple[Column, ...]
+    blocks: tuple[Block, ...]
+    notes: Sequence[str]
+
+    @property
+    def overall(self) -> tuple[Block, ...]:
+        """The blocks over all families."""
+        return tuple(block for block in self.blocks if block.family == ALL)

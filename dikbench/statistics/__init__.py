@@ -1,0 +1,1 @@
+"""Statistics over trials: failures, means, intervals, profiles. One concept per file."""

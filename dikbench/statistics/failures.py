@@ -1,0 +1,49 @@
+"""What a failed trial counts for.
+
+A failed trial is never dropped and never turned into a time:
+
+- it stands in the failure rate, which comes first in every table;
+- in an average it takes its metric's `worst` value where that is finite (pi for an angle, 1 for a
+  share of violating steps, 0 for a share of success); where it is infinite an average cannot carry
+  it, and the average then rests on fewer trials, which excludes its law from being marked best;
+- in an extreme (the worst over scenarios) it takes the `worst` value, infinite or not;
+- in a performance or data profile it is a problem that was not solved: an infinite ratio.
+
+What a failed trial recorded before it broke off is not used: it would flatter an early failure.
+A skipped trial is no failure: the cell cannot work; it counts nowhere but in profiles, which
+compare laws on the same problems and take it as not solved.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from dikbench.array import Array, Mask
+from dikbench.metrics import METRICS
+from dikbench.status import Status
+
+SKIPPED = Status.SKIPPED.value
+
+
+def ran(trials: pd.DataFrame) -> pd.DataFrame:
+    """The rows of trials that were not skipped."""
+    rows: pd.DataFrame = trials[trials["status"] != SKIPPED]
+    return rows
+
+
+def has_failed(trials: pd.DataFrame) -> Mask:
+    """Whether each trial failed: neither ran to its end nor was skipped."""
+    failed: Mask = ~trials["status"].isin([Status.OK.value, SKIPPED]).to_numpy()
+    return failed
+
+
+def worst_value(metric: str) -> float:
+    """What a failed trial takes of a metric; infinity for what is none of ours (a time)."""
+    return METRICS[metric].worst if metric in METRICS else np.inf
+
+
+def with_failures(trials: pd.DataFrame, metric: str) -> Array:
+    """A metric of each trial, with failed trials at its worst value, which may be infinite."""
+    recorded = trials[metric].to_numpy(dtype=float)
+    return np.where(has_failed(trials), worst_value(metric), recorded)
