@@ -108,8 +108,11 @@ def _metrics(comparison: Comparison, rows: int | None) -> list[str]:
         "mean A": head["mean_a"].map(_number),
         "mean B - A": head["mean_difference"].map(_signed),
         "95 % interval": [_interval(row["low"], row["high"]) for row in _records(head)],
-        "worst B - A": head["worst_difference"].map(_signed),
-        "in": [f"{row['scenario']} seed {row['seed']}" for row in _records(head)],
+        "worst B - A": head["worst_difference"].map(_signed).where(head["worse"] > 0, ""),
+        "in": [
+            f"{row['scenario']} seed {row['seed']}" if row["worse"] else ""
+            for row in _records(head)
+        ],
     }
     if not comparison.guarded:
         del columns["beyond"]

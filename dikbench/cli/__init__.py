@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import shlex
 import signal
 import sys
@@ -12,23 +11,10 @@ from typing import Any
 
 import click
 
-from dikbench.errors import DikbenchError
+from dikbench.cli.one_line_errors import one_line_errors
+from dikbench.cli.results import compare, replay
 
 SUBJECTS = ("formulations", "scenarios", "solvers", "robots", "metrics", "studies")
-
-
-def one_line_errors(command: Callable[..., None]) -> Callable[..., None]:
-    """Turn an error that a user caused into one line on stderr and exit code 2."""
-
-    @functools.wraps(command)
-    def wrapped(*args: Any, **kwargs: Any) -> None:
-        try:
-            command(*args, **kwargs)
-        except DikbenchError as error:
-            click.echo("error: " + " ".join(str(error).split()), err=True)
-            sys.exit(2)
-
-    return wrapped
 
 
 def main() -> None:
@@ -268,35 +254,5 @@ def show(name: str, figure: Path | None) -> None:
     click.echo(text)
 
 
-@commands.command()
-@click.argument("a", type=click.Path(path_type=Path, file_okay=False))
-@click.argument("b", type=click.Path(path_type=Path, file_okay=False))
-@click.option(
-    "--tolerance",
-    "tolerances",
-    multiple=True,
-    metavar="METRIC=VALUE",
-    help="How much worse a metric may become in any trial, in its unit or in percent of its value "
-    "in A ('position_error_rms_m=5%'); repeat. A trial that newly fails is then beyond it as well.",
-)
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="FILE",
-    help="Write every row: the text (.md), or each difference of each trial (.csv).",
-)
-@one_line_errors
-def compare(a: Path, b: Path, tolerances: tuple[str, ...], out: Path | None) -> None:
-    """Compare two results folders, B with A, regressions first.
-
-    The exit code is 1 where a tolerance is exceeded, 2 where the folders cannot be compared.
-    """
-    from dikbench.comparison.comparison import compare as compare_folders
-    from dikbench.comparison.rendering import render, write
-    from dikbench.comparison.tolerances import parse_tolerance
-
-    found = compare_folders(a, b, [parse_tolerance(text) for text in tolerances])
-    if out is not None:
-        write(found, out)
-    click.echo(render(found))
-    sys.exit(1 if found.regressed else 0)
+commands.add_command(compare)
+commands.add_command(replay)
