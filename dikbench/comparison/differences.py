@@ -69,8 +69,8 @@ def trial_differences(matched: MatchedTrials) -> pd.DataFrame:
 def law_differences(matched: MatchedTrials, tolerances: Sequence[Tolerance] = ()) -> pd.DataFrame:
     """A row per law and metric that differs in any trial, regressions first.
 
-    First come rows with a trial beyond a tolerance, then rows with a trial that became worse, then
-    the others; among each, those with the largest worsening in relation to the value in A.
+    First come rows with a trial beyond a tolerance, then the others; among each, those with the
+    largest worsening of a trial in relation to its value in A, and last those without any.
 
     Returns:
         The columns of `LAW`, and
@@ -104,7 +104,7 @@ def law_differences(matched: MatchedTrials, tolerances: Sequence[Tolerance] = ()
     if not rows:
         return pd.DataFrame()
     table = pd.DataFrame(rows)
-    order = np.lexsort((-table["severity"], -(table["worse"] > 0), -(table["beyond"] > 0)))
+    order = np.lexsort((-table["severity"], table["beyond"] == 0))
     return table.iloc[order].drop(columns="severity").reset_index(drop=True)
 
 

@@ -40,7 +40,7 @@ def read_exports(folder: Path) -> tuple[pd.DataFrame, dict[str, Any]]:
 
 def _table(path: Path) -> pd.DataFrame:
     try:
-        # As text first: pandas' own reader of numbers errs in the last bit.
+        # As text first: pandas' own reader of numbers errs in the last bit, and takes "NA" for one.
         table = pd.read_csv(path, dtype=str, keep_default_na=False, na_values=[""])
     except (OSError, ValueError) as error:  # pandas' own are among them
         raise DikbenchError(f"{path} cannot be read: {error}") from None

@@ -131,6 +131,17 @@ def test_what_cannot_be_read_is_one_line(folder: Path, committed: Path, tmp_path
         dikbench.load_results(tmp_path)
 
 
+def test_texts_stay_texts(committed: Path, tmp_path: Path) -> None:
+    """A message or a law may be called what pandas takes for a missing value or for a number."""
+    shutil.copytree(committed, tmp_path, dirs_exist_ok=True)
+    table = pd.read_csv(tmp_path / "trials.csv", dtype=str, keep_default_na=False)
+    table.loc[0, ["formulation", "message", "id"]] = ["null", "NA", "1e5"]
+    table.to_csv(tmp_path / "trials.csv", index=False)
+    row = dikbench.load_results(tmp_path).trials.iloc[0]
+    assert (row["formulation"], row["message"], row["id"]) == ("null", "NA", "1e5")
+    assert row["solver"] == "none"
+
+
 def test_a_store_of_another_version_is_read_through_its_exports(
     folder: Path, tmp_path: Path
 ) -> None:

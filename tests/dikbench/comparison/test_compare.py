@@ -77,6 +77,24 @@ def test_a_tampered_metric_is_the_first_line(folder: Callable[..., Path]) -> Non
     assert dikbench(a, b).exit_code == 0
 
 
+def test_what_is_beyond_a_tolerance_comes_before_what_is_worse(folder: Callable[..., Path]) -> None:
+    """A metric that nobody guards may become much worse without hiding one that is guarded."""
+
+    def change(table: pd.DataFrame) -> None:
+        table.loc[:2, "position_error_rms_m"] = [9.0, 0.1, 0.5]
+        table.loc[3, "sigma_min"] = 0.49
+        table.loc[4, "joint_travel_rad"] = 0.1
+
+    a, b = folder("a"), folder("b", change)
+
+    def order(*options: str) -> list[str]:
+        return [line.split("|")[1].strip() for line in lines_of(dikbench(a, b, *options))]
+
+    assert order() == ["position_error_rms_m", "sigma_min", "joint_travel_rad"]
+    guarded = order("--tolerance", "sigma_min=1%")
+    assert guarded == ["sigma_min", "position_error_rms_m", "joint_travel_rad"]
+
+
 def test_one_seed_of_one_scenario_has_no_interval(folder: Callable[..., Path]) -> None:
     """A single trial says nothing of others: its difference stands there without an interval."""
     a = folder("a", lambda table: table.head(1))
@@ -128,6 +146,7 @@ def test_newly_failed_trials_come_before_all_numbers(folder: Callable[..., Path]
     mended = dikbench(b, a, "--tolerance", "position_error_rms_m=1")
     assert mended.exit_code == 0
     assert "diverged -> ok" in mended.output
+    assert [line for line in lines_of(mended) if "dls" in line] == []
 
 
 def test_trials_of_one_folder_are_counted_and_named(folder: Callable[..., Path]) -> None:

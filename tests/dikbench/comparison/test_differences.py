@@ -93,7 +93,7 @@ def test_versions_are_shown(folder: Callable[..., Path]) -> None:
         "b",
         lambda table: table.assign(id=table["id"] + "x"),
         git_commit="bbb",
-        libraries={"numpy": "2.1", "pin": "4.1"},
+        libraries={"numpy": "2.1", "pin": "4.1", "cvxpy": None},
         solvers={"daqp": "0.7", "osqp": "1.0"},
     )
     found = compare(a, b)
