@@ -23,10 +23,13 @@ if TYPE_CHECKING:
         CentreOfMassTask,
         DampingTask,
         LinearizedTask,
+        OrientationTask,
         PoseTask,
+        PositionTask,
         PostureTask,
         Task,
     )
+    from dikbench.tidy import Results, load_results
 
 _HOME = {
     "CentreOfMassTask": "tasks",
@@ -38,9 +41,12 @@ _HOME = {
     "Formulation": "problem",
     "Infeasible": "errors",
     "LinearizedTask": "tasks",
+    "OrientationTask": "tasks",
     "PoseTask": "tasks",
+    "PositionTask": "tasks",
     "PostureTask": "tasks",
     "QuadraticProgram": "quadratic_program",
+    "Results": "tidy",
     "Robot": "robot",
     "Scenario": "scenario",
     "Solve": "problem",
@@ -48,6 +54,7 @@ _HOME = {
     "Status": "status",
     "Task": "tasks",
     "TorqueConstraint": "constraints",
+    "load_results": "tidy",
     "load_robot": "robot_catalogue",
     "solve_dik": "one_step",
 }
@@ -62,9 +69,12 @@ __all__ = [
     "Formulation",
     "Infeasible",
     "LinearizedTask",
+    "OrientationTask",
     "PoseTask",
+    "PositionTask",
     "PostureTask",
     "QuadraticProgram",
+    "Results",
     "Robot",
     "Scenario",
     "Solve",
@@ -72,6 +82,7 @@ __all__ = [
     "Status",
     "Task",
     "TorqueConstraint",
+    "load_results",
     "load_robot",
     "solve_dik",
 ]

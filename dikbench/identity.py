@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os.path
 from dataclasses import fields, is_dataclass
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 from dikbench.oracle import ORACLE
 from dikbench.registry import (
-    Plugin,
     formulation_plugin,
     make_formulation,
     make_plant,
@@ -21,6 +18,7 @@ from dikbench.registry import (
 )
 from dikbench.selector import parse_selector
 from dikbench.solvers.catalogue import parse_solver
+from dikbench.source import digest, digest_of_file, source_digest
 from dikbench.trial import NO_SOLVER, Trial
 
 
@@ -28,8 +26,9 @@ def trial_id(trial: Trial) -> str:
     """The id of a trial, 16 hexadecimal digits.
 
     Made of the law and its parameters, the scenario family and its parameters, both with the
-    version of their source; the solver, how it is called and its settings; plant, reference mode
-    and seed. Selectors that mean the same (a default that is spelt out) give the same id.
+    version of their source (see `source_digest`); the solver, how it is called and its settings;
+    plant, reference mode and seed. Selectors that mean the same (a default that is spelt out) give
+    the same id.
 
     Raises:
         DikbenchError: if a selector does not name anything valid.
@@ -37,12 +36,12 @@ def trial_id(trial: Trial) -> str:
     cell = cell_id(trial.formulation, trial.solver, trial.scenario)
     plant = make_plant(trial.plant)
     how = (plant.drive.__name__, plant.noise, plant.delay, trial.reference, trial.seed)
-    return _digest(json.dumps((cell, *how)))
+    return digest(json.dumps((cell, *how)))
 
 
 def cell_id(formulation: str, solver: str, scenario: str) -> str:
     """The id of a cell that is timed: what `trial_id` is made of, but for how a trial is run."""
-    return _digest(json.dumps((_formulation(formulation), _solver(solver), scenario_id(scenario))))
+    return digest(json.dumps((_formulation(formulation), _solver(solver), scenario_id(scenario))))
 
 
 @lru_cache(maxsize=4096)
@@ -53,7 +52,9 @@ def _formulation(text: str) -> str:
     plugin = formulation_plugin(parse_selector(text).name)
     names: list[str] = [field.name for field in fields(law)] if is_dataclass(law) else []
     values = {name: repr(getattr(law, name)) for name in names}
-    return _digest(json.dumps([type(law).__qualname__, values, _source(plugin)], sort_keys=True))
+    return digest(
+        json.dumps([type(law).__qualname__, values, source_digest(plugin)], sort_keys=True)
+    )
 
 
 @lru_cache(maxsize=65536)
@@ -61,7 +62,7 @@ def scenario_id(text: str) -> str:
     """The id of a scenario: its family, parameters and the version of its source, not its seed."""
     name = parse_selector(text).name
     values = {key: _described(value) for key, value in scenario_parameters(text).items()}
-    return _digest(json.dumps([name, values, _source(scenario_plugin(name))], sort_keys=True))
+    return digest(json.dumps([name, values, source_digest(scenario_plugin(name))], sort_keys=True))
 
 
 @lru_cache(maxsize=4096)
@@ -70,7 +71,7 @@ def _solver(text: str) -> str:
         return text
     solver = parse_solver(text)
     settings: dict[str, Any] = {key: repr(value) for key, value in solver.settings.items()}
-    return _digest(
+    return digest(
         json.dumps([solver.name, solver.interface, settings, solver.tolerance], sort_keys=True)
     )
 
@@ -78,21 +79,5 @@ def _solver(text: str) -> str:
 def _described(value: Any) -> str:
     """A parameter's value; of a file that it names, the contents as well."""
     if isinstance(value, str) and os.path.isfile(value):
-        return f"{value!r} {_digest_of_file(value)}"
+        return f"{value!r} {digest_of_file(value)}"
     return repr(value)
-
-
-def _source(plugin: Plugin) -> str:
-    return _digest_of_file(plugin.file)
-
-
-@lru_cache(maxsize=256)
-def _digest_of_file(file: str) -> str:
-    try:
-        return _digest(Path(file).read_bytes().decode(errors="replace"))
-    except OSError:  # a class made at a prompt has no file
-        return ""
-
-
-def _digest(text: str) -> str:
-    return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()

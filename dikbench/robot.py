@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final
@@ -29,6 +30,8 @@ class Robot:
             six in space, (0, 1, 5) for an arm in the x-y plane. Tasks on the pose keep to them.
         available_acceleration: acceleration limits [rad/s^2] known for this robot, shape (nv,),
             in force only where a scenario or `with_limits` says so; None where none are known.
+        visuals: builds what is drawn of it (`pinocchio.GeometryModel`), which may raise ValueError
+            where a mesh is missing; None where there is only the chain of joints.
     """
 
     name: str
@@ -38,6 +41,7 @@ class Robot:
     q0: Array
     task_rows: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
     available_acceleration: Array | None = None
+    visuals: Callable[[], Any] | None = None
 
     def __post_init__(self) -> None:
         """Keep laws from writing to the start, which every later trial shares."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os.path
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from math import pi
 from pathlib import Path
 from types import MappingProxyType
@@ -21,7 +21,7 @@ from dikbench.errors import DikbenchError, unknown
 from dikbench.omnidirectional_base import omnidirectional_base
 from dikbench.planar_arm import planar_arm
 from dikbench.robot import Robot, checked_vector, frame_id, model_limits
-from dikbench.robot_data import from_data, joints
+from dikbench.robot_data import DataModel, joints, urdf_visuals
 
 UR_START = (0.3, -1.2, 1.4, -1.7, -1.4, 0.2)
 NOT_PUBLISHED = "no data sheet or manual gives any"
@@ -64,7 +64,7 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
     {
         "panda": CatalogueEntry(
             summary="Franka Emika Panda, 7 joints, fingers locked",
-            model=from_data(
+            model=DataModel(
                 "panda_description/urdf/panda.urdf",
                 moving=joints("panda_joint{}", 1, 7),
             ),
@@ -75,7 +75,7 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
         ),
         "ur3": CatalogueEntry(
             summary="Universal Robots UR3, 6 joints, the UR5's small sister",
-            model=from_data("ur_description/urdf/ur3_robot.urdf"),
+            model=DataModel("ur_description/urdf/ur3_robot.urdf"),
             frame="tool0",
             start=UR_START,
             acceleration=(4.32, 4.32, 6.3, 6.4, 6.4, 6.4),
@@ -83,7 +83,7 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
         ),
         "ur5": CatalogueEntry(
             summary="Universal Robots UR5, 6 joints, spherical-like wrist",
-            model=from_data("ur_description/urdf/ur5_robot.urdf"),
+            model=DataModel("ur_description/urdf/ur5_robot.urdf"),
             frame="tool0",
             start=UR_START,
             acceleration=(6.3, 6.3, 6.3, 6.4, 6.4, 6.4),
@@ -91,7 +91,7 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
         ),
         "ur10": CatalogueEntry(
             summary="Universal Robots UR10, 6 joints, the UR5's longer sister",
-            model=from_data("ur_description/urdf/ur10_robot.urdf"),
+            model=DataModel("ur_description/urdf/ur10_robot.urdf"),
             frame="tool0",
             start=UR_START,
             acceleration=(4.32, 4.32, 6.3, 6.4, 6.4, 6.4),
@@ -99,7 +99,7 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
         ),
         "xarm7": CatalogueEntry(
             summary="UFACTORY xArm7, 7 joints; its zero posture is singular",
-            model=from_data("xarm_description/urdf/xarm7.urdf"),
+            model=DataModel("xarm_description/urdf/xarm7.urdf"),
             frame="link_eef",
             start=(0, -0.5, 0, 1.0, 0, 1.3, 0),
             acceleration=(20,) * 7,
@@ -107,7 +107,7 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
         ),
         "kinova": CatalogueEntry(
             summary="Kinova Jaco 2 (j2s6s200), 6 joints, three of them continuous",
-            model=from_data("kinova_description/robots/kinova.urdf"),
+            model=DataModel("kinova_description/robots/kinova.urdf"),
             frame="j2s6s200_end_effector",
             start=(0, 2.9, 1.3, -2.07, 1.4, 0),
             acceleration=None,
@@ -115,7 +115,7 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
         ),
         "tiago": CatalogueEntry(
             summary="the arm of PAL Robotics' TIAGo, 7 joints, torso, head and wheels locked",
-            model=from_data(
+            model=DataModel(
                 "tiago_description/robots/tiago_no_hand.urdf", moving=joints("arm_{}_joint", 1, 7)
             ),
             frame="arm_tool_link",
@@ -125,7 +125,7 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
         ),
         "talos": CatalogueEntry(
             summary="the left arm of PAL Robotics' Talos, 7 joints, all others locked",
-            model=from_data(
+            model=DataModel(
                 "talos_data/robots/talos_reduced.urdf", moving=joints("arm_left_{}_joint", 1, 7)
             ),
             frame="gripper_left_base_link",
@@ -231,7 +231,8 @@ def _load_named(name: str) -> Robot:
     limits = model_limits(model).with_interval("effort", None)
     acceleration = None if entry.acceleration is None else np.array(entry.acceleration, dtype=float)
     q0 = pin.integrate(model, pin.neutral(model), np.array(entry.start, dtype=float))
-    return Robot(name, model, entry.frame, limits, q0, entry.task_rows, acceleration)
+    visuals = entry.model.visuals if isinstance(entry.model, DataModel) else None
+    return Robot(name, model, entry.frame, limits, q0, entry.task_rows, acceleration, visuals)
 
 
 def _load_urdf(path: str, frame: str | None) -> Robot:
@@ -252,7 +253,9 @@ def _load_urdf(path: str, frame: str | None) -> Robot:
         raise DikbenchError(f"robot file {path}: name its task frame; valid: {frames}")
     limits = model_limits(model).with_interval("effort", None)
     name = Path(path).stem
-    return Robot(name, model, frame, limits, _well_conditioned_start(model, frame))
+    start = _well_conditioned_start(model, frame)
+    visuals = partial(urdf_visuals, model, path, Path(path).absolute().parent)
+    return Robot(name, model, frame, limits, start, visuals=visuals)
 
 
 def _well_conditioned_start(model: Any, frame: str) -> Array:
@@ -272,6 +275,7 @@ def _well_conditioned_start(model: Any, frame: str) -> Array:
         q = pin.integrate(model, neutral, x)
         q[limits.q_index] = np.where(np.isfinite(limits.position.upper), x, q[limits.q_index])
         J = pin.computeFrameJacobian(model, data, q, index, pin.LOCAL)
+        J = J.reshape(6, model.nv)  # of a single joint Pinocchio gives a vector
         sigma = np.linalg.svd(J, compute_uv=False)[min(6, model.nv) - 1]
         if sigma > best_sigma:
             best, best_sigma = q, float(sigma)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
-from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,22 +12,53 @@ import pinocchio as pin
 from dikbench.errors import DikbenchError
 
 
-def from_data(path: str, moving: tuple[str, ...] = ()) -> Callable[[], Any]:
-    """A function that builds the Pinocchio model of a URDF below the package's folder `robots`.
+@dataclass(frozen=True)
+class DataModel:
+    """A model of a URDF below the package's folder `robots`; a call builds the Pinocchio model.
 
-    Args:
+    Attributes:
         path: of the file.
         moving: names of the joints that move, the others are locked at zero; empty: all.
     """
 
-    def build() -> Any:
-        model = pin.buildModelFromUrdf(str(_data_folder() / path))
-        if not moving:
-            return model
-        locked = [index for index, name in enumerate(model.names) if index and name not in moving]
-        return pin.buildReducedModel(model, locked, pin.neutral(model))
+    path: str
+    moving: tuple[str, ...] = ()
 
-    return build
+    def __call__(self) -> Any:
+        """Build the Pinocchio model."""
+        model = self._whole()
+        if not self.moving:
+            return model
+        return pin.buildReducedModel(model, self._locked(model), pin.neutral(model))
+
+    def visuals(self) -> Any:
+        """Build what is drawn of it, meshes among them (`pinocchio.GeometryModel`)."""
+        model, folder = self._whole(), _data_folder()
+        file = str(folder / self.path)
+        visuals = urdf_visuals(model, file, folder.parents[1])
+        if not self.moving:
+            return visuals
+        return pin.buildReducedModel(model, visuals, self._locked(model), pin.neutral(model))[1]
+
+    def _whole(self) -> Any:
+        return pin.buildModelFromUrdf(str(_data_folder() / self.path))
+
+    def _locked(self, model: Any) -> list[int]:
+        return [n for n, name in enumerate(model.names) if n and name not in self.moving]
+
+
+def urdf_visuals(model: Any, file: str, packages: Path) -> Any:
+    """Build what a URDF says is to be drawn (`pinocchio.GeometryModel`).
+
+    Args:
+        model: the Pinocchio model of the whole file.
+        file: the URDF.
+        packages: folder in which the packages lie that its meshes name.
+
+    Raises:
+        ValueError: if a mesh is not found or not read.
+    """
+    return pin.buildGeomFromUrdf(model, file, pin.GeometryType.VISUAL, package_dirs=[str(packages)])
 
 
 def joints(pattern: str, first: int, last: int) -> tuple[str, ...]:

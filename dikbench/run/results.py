@@ -12,7 +12,8 @@ import pandas as pd
 from filelock import FileLock, Timeout
 
 from dikbench.errors import DikbenchError
-from dikbench.run.store import Store
+from dikbench.run.exports import MANIFEST, TRIALS, are_exported, read_exports
+from dikbench.run.store import OtherVersion, Store
 
 
 class ResultsFolder:
@@ -96,12 +97,12 @@ class ResultsFolder:
         try:
             times = store.times()
             text = json.dumps(store.manifest(), indent=2, ensure_ascii=False) + "\n"
-            _replace(self.path / "trials.csv", lambda file: trials.to_csv(file, index=False))
+            _replace(self.path / TRIALS, lambda file: trials.to_csv(file, index=False))
             _replace(self.path / "timing.csv", lambda file: times.to_csv(file, index=False))
             _replace(
                 self.path / "trials.parquet", lambda file: trials.to_parquet(file, index=False)
             )
-            _replace(self.path / "manifest.json", lambda file: file.write_text(text))
+            _replace(self.path / MANIFEST, lambda file: file.write_text(text))
         except OSError as error:
             reason = error.strerror or str(error)
             raise DikbenchError(
@@ -109,13 +110,20 @@ class ResultsFolder:
             ) from None
 
     def read(self) -> tuple[pd.DataFrame, dict[str, Any]]:
-        """The trials of the last run, and the manifest.
+        """The trials of the last run and the manifest: from the store, else from its exports.
 
         Raises:
             DikbenchError: if the folder holds no results.
         """
-        with self.open_store() as store:
-            return store.trials(), store.manifest()
+        exported = are_exported(self.path)
+        if not exported or self.database.is_file():
+            try:
+                with self.open_store() as store:
+                    return store.trials(), store.manifest()
+            except OtherVersion:
+                if not exported:
+                    raise
+        return read_exports(self.path)
 
 
 def _replace(path: Path, write: Callable[[Path], object]) -> None:

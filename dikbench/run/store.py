@@ -52,6 +52,10 @@ and shown after it. It is `superseded`, kept but not shown, where the plan has a
 selectors whose law or scenario has another source."""
 
 
+class OtherVersion(DikbenchError):
+    """A store that a dikbench with other tables or metrics wrote."""
+
+
 @dataclass(frozen=True)
 class StoredTrial:
     """What identifies a row.
@@ -282,13 +286,13 @@ class Store:
         except sqlite3.DatabaseError as error:
             raise DikbenchError(f"store {self.path}: not a store of dikbench: {error}") from None
         if found.get("schema") != str(SCHEMA):
-            raise DikbenchError(
+            raise OtherVersion(
                 f"store {self.path}: schema version {found.get('schema')!r} is not known; this "
                 f"dikbench reads version {SCHEMA}"
             )
         missing = [name for name in NUMBERS if name not in columns]
         if missing and not add_metrics:
-            raise DikbenchError(
+            raise OtherVersion(
                 f"store {self.path}: written by a dikbench with other metrics (it lacks "
                 f"{min(missing)!r}); choose another folder, or add them with `dikbench recompute`"
             )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import shlex
 import signal
 import sys
@@ -12,23 +11,10 @@ from typing import Any
 
 import click
 
-from dikbench.errors import DikbenchError
+from dikbench.cli.one_line_errors import one_line_errors
+from dikbench.cli.results import compare, replay
 
 SUBJECTS = ("formulations", "scenarios", "solvers", "robots", "metrics", "studies")
-
-
-def one_line_errors(command: Callable[..., None]) -> Callable[..., None]:
-    """Turn an error that a user caused into one line on stderr and exit code 2."""
-
-    @functools.wraps(command)
-    def wrapped(*args: Any, **kwargs: Any) -> None:
-        try:
-            command(*args, **kwargs)
-        except DikbenchError as error:
-            click.echo("error: " + " ".join(str(error).split()), err=True)
-            sys.exit(2)
-
-    return wrapped
 
 
 def main() -> None:
@@ -307,3 +293,7 @@ def show(name: str, figure: Path | None) -> None:
         draw_scenario(name, figure)
         text += f"\n\n{figure}"
     click.echo(text)
+
+
+commands.add_command(compare)
+commands.add_command(replay)

@@ -1,0 +1,1 @@
+"""A trial in the browser: the robot moving along its trace."""

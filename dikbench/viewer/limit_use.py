@@ -1,0 +1,54 @@
+"""How near every joint is to its limits at every control step."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from dikbench.array import Array
+from dikbench.limits import JointLimits
+from dikbench.metrics import NEGLIGIBLE
+from dikbench.trace import Trace
+
+NEAR_SHARE: Final = 0.9
+"""From this share of a limit on a joint is called near it."""
+
+
+class Nearness(IntEnum):
+    """Where a joint is with regard to the limits on its position and its speed."""
+
+    INSIDE = 0
+    NEAR = 1
+    PAST = 2
+
+
+def nearness(trace: Trace, limits: JointLimits) -> npt.NDArray[np.int_]:
+    """The nearness of every joint, (n + 1, nv): before each step, with its speed, and at the end.
+
+    A joint is past a limit where it is so by more than `NEGLIGIBLE`, as in the metrics.
+    """
+    use, excess = np.zeros((2, trace.steps + 1, limits.nv))
+    position, speed = limits.position, limits.velocity
+    if position is not None:
+        at = trace.q[:, limits.q_index]
+        use = _share_of_range(at, position.lower, position.upper)
+        excess = np.maximum(at - position.upper, position.lower - at)
+    if speed is not None:
+        v = trace.applied
+        use[:-1] = np.maximum(use[:-1], speed.usage(v))
+        too_fast = np.maximum(v - speed.upper, speed.lower - v)
+        excess[:-1] = np.maximum(excess[:-1], too_fast)
+    near = np.where(use >= NEAR_SHARE, Nearness.NEAR, Nearness.INSIDE)
+    return np.where(excess > NEGLIGIBLE, Nearness.PAST, near)
+
+
+def _share_of_range(at: Array, lower: Array, upper: Array) -> Array:
+    """Distance from the middle of a joint's range over half of it; 0 where it is unbounded."""
+    with np.errstate(invalid="ignore"):  # infinity minus infinity
+        middle, half = (lower + upper) / 2, (upper - lower) / 2
+        share = np.abs(at - middle) / half
+    bounded: Array = np.where(np.isfinite(half), share, 0.0)
+    return bounded

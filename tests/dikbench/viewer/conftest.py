@@ -1,0 +1,29 @@
+"""A small run whose trials are replayed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from dikbench.run.runner import RunSettings, run_study
+from dikbench.study import Cells, Study
+
+STUDY = Study(
+    description="an arm with meshes and one without, a fast law, a step without a path",
+    cells=(Cells(("pinv",)),),
+    scenarios=(
+        "speed-sweep[robot=planar3r,laps=1,speed=1.5]",
+        "reach[robot=ur5,duration=0.2]",
+    ),
+    plants=("ideal",),
+    name="viewed",
+)
+
+
+@pytest.fixture(scope="session")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder in which `dikbench run` has left `runs/viewed`."""
+    folder = tmp_path_factory.mktemp("viewer")
+    run_study(STUDY, folder / "runs" / "viewed", RunSettings(jobs=1), "a test")
+    return folder

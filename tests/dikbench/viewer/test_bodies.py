@@ -1,0 +1,81 @@
+"""What is drawn of a robot is where the robot is."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from dikbench.report.scenario_figure import stick
+from dikbench.robot_catalogue import ROBOTS, load_robot
+from dikbench.robot_data import DataModel
+from dikbench.viewer.bodies import bodies, capsules
+
+ARM = """<robot name="arm">
+  <link name="base"/>
+  <link name="one"><visual><geometry>{}</geometry></visual></link>
+  <joint name="turn" type="revolute"><parent link="base"/><child link="one"/>
+    <origin xyz="0 0 0.3"/><axis xyz="0 1 0"/>
+    <limit lower="-1" upper="1" velocity="1" effort="1"/></joint>
+  <link name="tool"/>
+  <joint name="end" type="fixed"><parent link="one"/><child link="tool"/>
+    <origin xyz="0.5 0 0"/></joint>
+</robot>"""
+
+
+@pytest.mark.parametrize("name", ["panda", "talos"])
+def test_locked_joints_lock_their_meshes(name: str) -> None:
+    """Meshes of the reduced arm are where those of the whole robot are, others at zero."""
+    build = ROBOTS[name].model
+    assert isinstance(build, DataModel)
+    whole_model, robot = DataModel(build.path)(), load_robot(name)
+    whole, drawn = DataModel(build.path).visuals(), bodies(robot)
+    q = np.random.default_rng(0).uniform(-0.5, 0.5, robot.nq)
+    whole_q = pin.neutral(whole_model)
+    for joint, value in zip(robot.model.names[1:], q, strict=True):
+        whole_q[whole_model.joints[whole_model.getJointId(joint)].idx_q] = value
+    placements = []
+    for model, geometry, at in ((whole_model, whole, whole_q), (robot.model, drawn, q)):
+        data = geometry.createData()
+        pin.updateGeometryPlacements(model, model.createData(), geometry, data, at)
+        names = [body.name for body in geometry.geometryObjects]
+        placements.append(dict(zip(names, (X.homogeneous for X in data.oMg), strict=True)))
+    assert placements[0].keys() == placements[1].keys()
+    for key, placement in placements[0].items():
+        np.testing.assert_allclose(placements[1][key], placement, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["planar3r", "lwr", "panda"])
+def test_capsules_reach_from_joint_to_joint(name: str) -> None:
+    """Their ends are the points of the stick figure, which is computed otherwise."""
+    robot = load_robot(name)
+    geometry = capsules(robot)
+    data = geometry.createData()
+    q = np.random.default_rng(1).uniform(-1, 1, robot.nq)
+    pin.updateGeometryPlacements(robot.model, robot.model.createData(), geometry, data, q)
+    ends = []
+    for body, X in zip(geometry.geometryObjects, data.oMg, strict=True):
+        half = np.array([0.0, 0.0, body.geometry.halfLength])
+        ends.append([X.act(-half), X.act(half)])
+    points = stick(robot, q)
+    legs = [leg for leg in itertools.pairwise(points) if np.ptp(leg, axis=0).any()]
+    np.testing.assert_allclose(ends[: len(legs)], legs, atol=1e-12)
+
+
+def test_a_point_has_no_capsule() -> None:
+    """A mobile base is one joint without a length: nothing to draw, and no error."""
+    assert bodies(load_robot("base")).ngeoms == 0
+
+
+def test_a_urdf_s_own_shapes(tmp_path: Path) -> None:
+    """They are drawn; where a mesh is missing capsules stand in for them."""
+    file = tmp_path / "arm.urdf"
+    file.write_text(ARM.format('<box size="0.5 0.1 0.1"/>'))
+    (box,) = bodies(load_robot(str(file), "tool")).geometryObjects
+    np.testing.assert_allclose(2 * box.geometry.halfSide, [0.5, 0.1, 0.1])
+    file.write_text(ARM.format('<mesh filename="package://elsewhere/one.stl"/>'))
+    found = bodies(load_robot(str(file), "tool")).geometryObjects
+    assert [body.geometry.halfLength for body in found] == [0.15, 0.25]
