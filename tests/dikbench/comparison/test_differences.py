@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -127,3 +128,10 @@ def test_better_is_the_registry_s_business(folder: Callable[..., Path]) -> None:
     assert list(laws["worse"]) == [6, 6]
     assert list(compare(same, more).laws["better"]) == [6, 6]
     np.testing.assert_allclose(laws["mean_difference"], -0.1)
+
+
+def test_the_readme_s_tolerances() -> None:
+    """Those of its CI example are valid."""
+    readme = (Path(__file__).parents[3] / "README.md").read_text(encoding="utf-8")
+    found = re.findall(r"--tolerance (\S+=\S+)", readme)
+    assert [parse_tolerance(text).relative for text in found] == [False, True]
