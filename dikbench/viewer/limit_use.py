@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from dikbench.array import Array
 from dikbench.limits import JointLimits
-from dikbench.metrics import NEGLIGIBLE
+from dikbench.metrics.metric import NEGLIGIBLE
 from dikbench.trace import Trace
 
 NEAR_SHARE: Final = 0.9
