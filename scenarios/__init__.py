@@ -24,6 +24,7 @@ from scenarios.speed_sweep import speed_sweep
 from scenarios.start_outside import start_outside
 from scenarios.step import step
 from scenarios.task_conflict import task_conflict
+from scenarios.torque_limited import torque_limited
 from scenarios.workspace_boundary import workspace_boundary
 
 SCENARIOS: Mapping[str, Callable[..., Scenario]] = MappingProxyType(
@@ -41,6 +42,7 @@ SCENARIOS: Mapping[str, Callable[..., Scenario]] = MappingProxyType(
         "speed-sweep": speed_sweep,
         "hexagon": hexagon,
         "workspace-boundary": workspace_boundary,
+        "torque-limited": torque_limited,
         "pick-and-place": pick_and_place,
         "back-and-forth": back_and_forth,
         "csv": csv_poses,
