@@ -12,19 +12,27 @@ import pinocchio as pin
 from dikbench.errors import DikbenchError
 
 
-def from_data(path: str, moving: tuple[str, ...] = ()) -> Callable[[], Any]:
+def from_data(
+    path: str, moving: tuple[str, ...] = (), root: Callable[[], Any] | None = None
+) -> Callable[[], Any]:
     """A function that builds the Pinocchio model of a URDF below the package's folder `robots`.
 
     Args:
         path: of the file.
         moving: names of the joints that move, the others are locked at zero; empty: all.
+        root: makes the joint (`root_joint`, which moves) between world and robot; None: it is
+            fixed.
     """
 
     def build() -> Any:
-        model = pin.buildModelFromUrdf(str(_data_folder() / path))
+        file = str(_data_folder() / path)
+        model = (
+            pin.buildModelFromUrdf(file) if root is None else pin.buildModelFromUrdf(file, root())
+        )
         if not moving:
             return model
-        locked = [index for index, name in enumerate(model.names) if index and name not in moving]
+        kept = {"universe", "root_joint", *moving}
+        locked = [index for index, name in enumerate(model.names) if name not in kept]
         return pin.buildReducedModel(model, locked, pin.neutral(model))
 
     return build

@@ -14,6 +14,7 @@ from scenarios.csv_poses import csv_poses
 from scenarios.greedy_trap import greedy_trap
 from scenarios.hexagon import hexagon
 from scenarios.hold_still import hold_still
+from scenarios.humanoid import humanoid
 from scenarios.joint_limit_approach import joint_limit_approach
 from scenarios.joint_limit_crossing import joint_limit_crossing
 from scenarios.log_derivative_drift import log_derivative_drift
@@ -45,6 +46,7 @@ SCENARIOS: Mapping[str, Callable[..., Scenario]] = MappingProxyType(
         "torque-limited": torque_limited,
         "pick-and-place": pick_and_place,
         "back-and-forth": back_and_forth,
+        "humanoid": humanoid,
         "csv": csv_poses,
     }
 )
