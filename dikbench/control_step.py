@@ -92,16 +92,29 @@ def _check_velocity(v: object, nv: int) -> None:
 def fallback(problem: DikProblem) -> Array:
     """Slow down uniformly: v = c v_prev, clipped to the velocity box.
 
-    c is the smallest factor in [0, 1] that no joint's acceleration limit forbids,
-    1 - min_i a_i dt / |v_prev,i|; without acceleration limits, or without v_prev, the robot stops
-    at once (outside a position limit the box then asks for the way back).
+    c is the smallest factor in [0, 1] that neither a joint's acceleration limit forbids,
+    1 - min_i a_i dt / |v_prev,i|, nor a row of G v <= h (a torque that is not there cannot brake);
+    without either, or without v_prev, the robot stops at once (outside a position limit the box
+    then asks for the way back).
     """
     box = velocity_box(problem.limits, problem.v_prev, problem.dt)  # not recorded as the law's
     v = np.zeros(problem.robot.nv)
-    acceleration = problem.limits.joint.acceleration
-    if problem.v_prev is not None and acceleration is not None:
-        slow = np.where(problem.v_prev > 0, -acceleration.lower, acceleration.upper) * problem.dt
-        speed = np.abs(problem.v_prev)
-        fast = speed > slow  # the others can stop in one step
-        v = float(np.max(1.0 - slow[fast] / speed[fast], initial=0.0)) * problem.v_prev
+    if problem.v_prev is not None:
+        v = _slowest(problem, problem.v_prev) * problem.v_prev
     return np.clip(v, box.lower, box.upper)
+
+
+def _slowest(problem: DikProblem, v_prev: Array) -> float:
+    """The smallest factor c (see `fallback`)."""
+    factors = [0.0]
+    acceleration = problem.limits.joint.acceleration
+    if acceleration is not None:
+        slow = np.where(v_prev > 0, -acceleration.lower, acceleration.upper) * problem.dt
+        speed = np.abs(v_prev)
+        fast = speed > slow  # the others can stop in one step
+        factors.extend(1.0 - slow[fast] / speed[fast])
+    if problem.G is not None and problem.h is not None:
+        change = problem.G @ v_prev
+        asking = (change < 0) & (problem.h < 0)  # rows that stopping would break
+        factors.extend(problem.h[asking] / change[asking])
+    return min(1.0, float(max(factors)))

@@ -31,6 +31,18 @@ LWR_TABLE = tuple(
     for turn, d in zip((1, -1, -1, 1, 1, -1, 0), (0.3105, 0, 0.40, 0, 0.39, 0, 0.078), strict=True)
 )
 """a [m], alpha [rad], d [m]; lengths as in Flacco, De Luca & Khatib 2015."""
+HALF_SITTING = (
+    *(0, 0, 1.01927, 0, 0, 0),
+    *(0, 0, -0.411354, 0.859395, -0.448041, -0.001708),
+    *(0, 0, -0.411354, 0.859395, -0.448041, -0.001708),
+    *(0, 0.006761),
+    *(0.258470, 0.6, -0.0002, -1.2, 0, 0, 0.1),
+    *(-0.258470, -0.6, 0.0002, -1.2, 0, 0, 0.1),
+    *(0, 0),
+)
+"""Base, left and right leg, torso, left and right arm, head: Talos' own half-sitting posture (its
+SRDF), the elbows bent from 0.5 to 1.2 rad and the arms 0.4 rad farther from the body, away from
+limits."""
 UR_BRAKING = (
     "joint speed limit over 0.5 s, the braking ramp that the safety system enforces "
     "(UR10/CB3 user manual, safety inputs)"
@@ -130,6 +142,25 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
             ),
             frame="gripper_left_base_link",
             start=(-0.4, 0.9, 0.6, -1.5, 0.5, 0.5, -0.1),
+            acceleration=None,
+            acceleration_source=NOT_PUBLISHED,
+        ),
+        "talos-humanoid": CatalogueEntry(
+            summary="PAL Robotics' Talos on its feet: a free base and 30 joints, grippers locked",
+            model=DataModel(
+                "talos_data/robots/talos_reduced.urdf",
+                moving=(
+                    *joints("leg_left_{}_joint", 1, 6),
+                    *joints("leg_right_{}_joint", 1, 6),
+                    *joints("torso_{}_joint", 1, 2),
+                    *joints("arm_left_{}_joint", 1, 7),
+                    *joints("arm_right_{}_joint", 1, 7),
+                    *joints("head_{}_joint", 1, 2),
+                ),
+                root=pin.JointModelFreeFlyer,
+            ),
+            frame="gripper_right_base_link",
+            start=HALF_SITTING,
             acceleration=None,
             acceleration_source=NOT_PUBLISHED,
         ),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,10 +20,13 @@ class DataModel:
     Attributes:
         path: of the file.
         moving: names of the joints that move, the others are locked at zero; empty: all.
+        root: makes the joint (`root_joint`, which moves) between world and robot; None: it is
+            fixed.
     """
 
     path: str
     moving: tuple[str, ...] = ()
+    root: Callable[[], Any] | None = None
 
     def __call__(self) -> Any:
         """Build the Pinocchio model."""
@@ -41,10 +45,14 @@ class DataModel:
         return pin.buildReducedModel(model, visuals, self._locked(model), pin.neutral(model))[1]
 
     def _whole(self) -> Any:
-        return pin.buildModelFromUrdf(str(_data_folder() / self.path))
+        file = str(_data_folder() / self.path)
+        if self.root is None:
+            return pin.buildModelFromUrdf(file)
+        return pin.buildModelFromUrdf(file, self.root())
 
     def _locked(self, model: Any) -> list[int]:
-        return [n for n, name in enumerate(model.names) if n and name not in self.moving]
+        kept = {"universe", "root_joint", *self.moving}
+        return [n for n, name in enumerate(model.names) if name not in kept]
 
 
 def urdf_visuals(model: Any, file: str, packages: Path) -> Any:

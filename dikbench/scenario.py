@@ -17,7 +17,7 @@ from dikbench.path import Path, path_of
 from dikbench.references import Reference
 from dikbench.robot import Robot
 from dikbench.steps import steps_in
-from dikbench.tasks import Task, TrackingTask
+from dikbench.tasks import Task, TrackingTask, TrackingTogether
 from dikbench.variation import NO_VARIATION, Variation
 
 
@@ -35,7 +35,7 @@ class Scenario:
         dt: control period [s].
         duration: length of a time-indexed run [s].
         certificate: what makes the scenario what it is.
-        tasks: secondary tasks, beside the tracking of the reference.
+        tasks: other tasks than the tracking of the reference: below it, or of its priority.
         motion: the joint motion from which the path was built, on which the certificate was
             measured, from q0 on; None where no joint motion follows the reference.
         variation: what a seed perturbs.
@@ -68,6 +68,12 @@ class Scenario:
     def rows(self) -> tuple[int, ...]:
         """The rows of the twist (linear; angular) of the task frame that are tracked."""
         return self.tracking.rows(self.robot)
+
+    @cached_property
+    def first(self) -> TrackingTask:
+        """The tracking, together with what is of the same priority."""
+        equal = tuple(task for task in self.tasks if task.priority == self.tracking.priority)
+        return TrackingTogether(self.tracking, equal) if equal else self.tracking
 
     @cached_property
     def targets(self) -> list[tuple[Any, Any]]:
@@ -108,4 +114,4 @@ class Scenario:
         instants = self.dt * np.arange(self.steps + 1, dtype=float)
         if self.motion.exact is not None:
             return np.array([self.motion.exact(tau) for tau in instants])
-        return follow(self.robot, self.reference, self.q0, instants, self.tracking)
+        return follow(self.robot, self.reference, self.q0, instants, self.first)

@@ -37,7 +37,10 @@ Check = Callable[[Formulation, str | None], None]
 
 
 class _Answer(NamedTuple):
-    """What a law gave: a velocity, or None and what it did instead; the solver's residual."""
+    """What a law gave: a velocity, or None and what it did instead; the solver's residual.
+
+    Of a law that solves several programs, each from what the last one gave, the residuals add up.
+    """
 
     velocity: Array | None
     status: Status
@@ -69,7 +72,7 @@ class _Asked:
             return _Answer(None, outcome.status, outcome.status.sentence, 0.0)
         verdicts = solve.verdicts()
         status = Status.NOT_VERIFIED if verdicts.lied[0] else outcome.status
-        residual = float(verdicts.primal[0])
+        residual = solve.calls * float(verdicts.primal[0])
         return _Answer(outcome.velocity, status, status.sentence, residual)
 
     def verified(self) -> Iterator[tuple[State, Array, float]]:
@@ -225,7 +228,7 @@ def check_inequalities(formulation: Formulation, solver: str | None = None) -> N
 def _check_promise(kind: LimitKind, formulation: Formulation, solver: str | None) -> None:
     if kind in promises_of(formulation):
         for state, v, tolerance in _Asked(formulation, solver).verified():
-            _assert_within(state, kind, v, tolerance)
+            assert_within(state, kind, v, tolerance)
 
 
 def _allowed(problem: DikProblem, kind: LimitKind) -> tuple[Array, Array] | None:
@@ -244,7 +247,8 @@ def _allowed(problem: DikProblem, kind: LimitKind) -> tuple[Array, Array] | None
     return v_prev + acceleration.lower * dt, v_prev + acceleration.upper * dt
 
 
-def _assert_within(state: State, kind: LimitKind, v: Array, tolerance: float) -> None:
+def assert_within(state: State, kind: LimitKind, v: Array, tolerance: float) -> None:
+    """Assert that a velocity (nv,) keeps one kind of limits at a state, to a tolerance [rad/s]."""
     if kind == "inequalities":
         _assert_inequalities(state, v, tolerance)
         return
@@ -286,7 +290,7 @@ def check_state(formulation: Formulation, state: State, solver: str | None = Non
         raise AssertionError(f"{state.label}: {answer.status.value}: {answer.message}")
     if answer.velocity is not None and answer.status is Status.OK:
         for kind in promises_of(formulation):
-            _assert_within(state, kind, answer.velocity, ROUNDING + answer.residual)
+            assert_within(state, kind, answer.velocity, ROUNDING + answer.residual)
 
 
 CHECKS: Final[tuple[Check, ...]] = (

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+import pinocchio as pin
 
 from dikbench.array import Array
 from dikbench.errors import DikbenchError
@@ -31,10 +32,11 @@ class DrakeSystem:
 
     J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s; e = q_nom - q is the
     error of the problem's posture task, (nv,) (zero where there is none); P the kernel of J by a
-    full-pivoting LU, as in `drake`; d the distance to the nearer position limit [rad], whose side
-    alone is scaled. Keeps the velocity limits and, by the scaling, the position limits in motions
-    of ordinary speed; outside a limit a joint may stay where it is. Leaves the course where the
-    bounds bind. Weights play no part.
+    full-pivoting LU, as in `drake`, but of a J in the axes of the world, as the system has it (the
+    pivots and with them the length of P's rows depend on the axes); d the distance to the nearer
+    position limit [rad], whose side alone is scaled. Keeps the velocity limits and, by the scaling,
+    the position limits in motions of ordinary speed; outside a limit a joint may stay where it is.
+    Leaves the course where the bounds bind. Weights play no part.
 
     Attributes:
         tracking_weight: G; Drake's own default is 1, its manual advises 100.
@@ -62,13 +64,23 @@ class DrakeSystem:
         J, V = problem.primary.J, problem.primary.V
         P = J.T @ J
         q = -J.T @ V
-        kernel = lu_kernel(angular_first(J))
+        kernel = lu_kernel(angular_first(_in_world_axes(problem, J)))
         if kernel.size:
             centred = kernel @ kernel.T / self.tracking_weight
             P += centred
             q -= centred @ (self.centering * posture_error(problem))
         lower, upper = scaled_bounds(problem.limits)
         return solve(QuadraticProgram(P, q, lb=lower, ub=upper))
+
+
+def _in_world_axes(problem: DikProblem, J: Array) -> Array:
+    """The Jacobian of a pose (6, nv) in the axes of the world; any other task's as it is."""
+    if len(J) != 6:
+        return J
+    robot = problem.robot
+    pin.forwardKinematics(robot.model, robot.scratch, problem.q)
+    R = pin.updateFramePlacement(robot.model, robot.scratch, robot.frame_id).rotation
+    return np.vstack([R @ J[:3], R @ J[3:]])
 
 
 def scaled_bounds(limits: Limits) -> tuple[Array, Array]:

@@ -14,6 +14,7 @@ from scenarios.csv_poses import csv_poses
 from scenarios.greedy_trap import greedy_trap
 from scenarios.hexagon import hexagon
 from scenarios.hold_still import hold_still
+from scenarios.humanoid import humanoid
 from scenarios.joint_limit_approach import joint_limit_approach
 from scenarios.joint_limit_crossing import joint_limit_crossing
 from scenarios.log_derivative_drift import log_derivative_drift
@@ -24,6 +25,7 @@ from scenarios.speed_sweep import speed_sweep
 from scenarios.start_outside import start_outside
 from scenarios.step import step
 from scenarios.task_conflict import task_conflict
+from scenarios.torque_limited import torque_limited
 from scenarios.workspace_boundary import workspace_boundary
 
 SCENARIOS: Mapping[str, Callable[..., Scenario]] = MappingProxyType(
@@ -41,8 +43,10 @@ SCENARIOS: Mapping[str, Callable[..., Scenario]] = MappingProxyType(
         "speed-sweep": speed_sweep,
         "hexagon": hexagon,
         "workspace-boundary": workspace_boundary,
+        "torque-limited": torque_limited,
         "pick-and-place": pick_and_place,
         "back-and-forth": back_and_forth,
+        "humanoid": humanoid,
         "csv": csv_poses,
     }
 )

@@ -7,6 +7,7 @@ from dikbench.tasks.pose import PoseTask
 from dikbench.tasks.position import PositionTask
 from dikbench.tasks.posture import PostureTask
 from dikbench.tasks.task import LinearizedTask, Task, TrackingTask
+from dikbench.tasks.together import TrackingTogether
 
 __all__ = [
     "CentreOfMassTask",
@@ -18,4 +19,5 @@ __all__ = [
     "PostureTask",
     "Task",
     "TrackingTask",
+    "TrackingTogether",
 ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from typing import Any
@@ -69,7 +68,7 @@ def mink_tick(scenario: Scenario) -> Tick:
     import mujoco
 
     robot, dt = scenario.robot, scenario.dt
-    model = mujoco.MjModel.from_xml_string(_bare_urdf())
+    model = mujoco.MjModel.from_xml_string(bare_urdf("panda_description/urdf/panda.urdf"))
     frame = mink.FrameTask(robot.frame, "body", 1.0, 1.0, gain=scenario.tracking.gain * dt)
     posture = mink.PostureTask(model, POSTURE_COST, gain=dt)
     names = [robot.model.names[joint] for joint in range(1, robot.model.njoints)]
@@ -90,10 +89,9 @@ def mink_tick(scenario: Scenario) -> Tick:
     return run
 
 
-def _bare_urdf() -> str:
-    """The Panda's URDF without meshes, fingers locked, for MuJoCo's reader."""
-    root = ET.parse(_data_folder() / os.path.join("panda_description", "urdf", "panda.urdf"))
-    robot = root.getroot()
+def bare_urdf(path: str) -> str:
+    """A URDF of example-robot-data without meshes, fingers locked, for MuJoCo's reader."""
+    robot = ET.parse(_data_folder() / path).getroot()
     for link in robot.iter("link"):
         for part in [*link.findall("visual"), *link.findall("collision")]:
             link.remove(part)

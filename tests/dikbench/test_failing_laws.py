@@ -322,6 +322,23 @@ def test_the_fallback_stays_in_the_box() -> None:
     assert fallback(outside) == pytest.approx([-0.2, 0.0, 0.0])  # a tenth of 2 rad/s
 
 
+@settings(deadline=None)
+@given(
+    v_prev=arrays(float, 3, elements=st.floats(-2, 2)),
+    G=arrays(float, (4, 3), elements=st.floats(-1, 1)),
+    room=arrays(float, 4, elements=st.floats(0, 0.5)),
+)
+def test_the_fallback_keeps_rows_that_going_on_would_keep(
+    v_prev: Array, G: Array, room: Array
+) -> None:
+    """Where v_prev satisfies G v <= h, so does the fallback, with the smallest c in [0, 1]."""
+    problem = _problem(v_prev, position=None, velocity=None)
+    problem.G, problem.h = G, G @ v_prev + room
+    v = fallback(problem)
+    assert np.all(G @ v <= problem.h + 1e-9)
+    assert np.abs(v).max() < 1e-6 or np.any(G @ (0.99 * v) > problem.h)
+
+
 def test_the_fallback_brings_a_robot_to_rest() -> None:
     """A law that never answers: the slowest joint's limit sets the pace, the path is straight."""
     scenario = _scenario(acceleration=[1.0, 30.0, 30.0])

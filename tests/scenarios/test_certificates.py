@@ -56,7 +56,7 @@ CLOSED = [name for name in SCENARIOS if name != "csv"]
 HELD = {"hold-still", "log-derivative-drift"}
 """Families whose target at rest is where the robot starts."""
 
-OTHER_TASKS = {"task-conflict", "start-outside"}
+OTHER_TASKS = {"task-conflict", "start-outside", "humanoid"}
 """Families with another second task than to hold the start's posture."""
 
 SELECTORS = [

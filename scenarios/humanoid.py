@@ -1,0 +1,164 @@
+"""A humanoid that stands and draws: feet, hand, centre of mass and posture, all at once."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.array import Array
+from dikbench.certificate import Certificate, Claim
+from dikbench.curves import circle, plane_of
+from dikbench.kinematics import Kinematics, smallest_singular_value
+from dikbench.oracle import OracleMotion, oracle_motion
+from dikbench.robot import Robot
+from dikbench.robot_catalogue import load_robot
+from dikbench.scenario import Scenario
+from dikbench.tasks import CentreOfMassTask, PoseTask, PostureTask, TrackingTogether
+from dikbench.variation import Variation
+from scenarios.common import (
+    POSTURE_WEIGHT,
+    between,
+    placement_of,
+    positive,
+    samples,
+    start_velocity,
+)
+
+FEET = ("left_sole_link", "right_sole_link")
+SOLE = (0.205, 0.122)
+"""Length and width of a foot [m], from Talos' SRDF."""
+
+FEET_GAIN = 0.5
+"""Share of its error that a foot is to be put back by in a control step (stable up to a delay of
+two steps)."""
+
+FEET_WEIGHT = 100.0
+"""For laws that weigh tasks of one level, or all: a foot that slips is worse than a hand that is
+late."""
+
+CENTRE_WEIGHT = 1e-2
+
+VARIATION = Variation(start=0.1, direction=0.2)
+
+
+def humanoid(
+    robot: Literal["talos-humanoid"] = "talos-humanoid",
+    *,
+    speed: float = 0.3,
+    radius: float = 0.1,
+    laps: float = 2.0,
+    gain: float = 5.0,
+    dt: float = 0.01,
+    seed: int = 0,
+) -> Scenario:
+    """A humanoid on both feet draws a circle with its right hand: 36 velocities, four tasks.
+
+    The base is free: nothing but the two pose tasks at the feet, of the same priority as the hand's
+    (and a hundred times its weight, for laws that weigh), keeps the robot where it is. Below them
+    the centre of mass stays where it is at the start, below that the posture. The hand goes round
+    upwards from the start, radius (sin w tau, 1 - cos w tau) in the world's y-z plane, its
+    orientation held; w follows from the least-norm joint motion that does so with the feet in
+    place. A seed moves the joints of the arms by up to 0.1 rad and turns the plane by up to
+    0.2 rad.
+
+    Provokes: feet that slip, on a robot with a free base and many more joints than tasks
+
+    Shows in: second_task_error_rms, position_error_max_m, orientation_error_max_rad
+
+    The second tasks are the feet and the centre of mass: their errors stand together in
+    `second_task_error_rms`.
+
+    Args:
+        robot: talos-humanoid.
+        speed: peak of the reference's joint motion over the limits, 0.05 to 0.9.
+        radius: of the circle [m], 0.02 to 0.15.
+        laps: number of laps, 1 to 5.
+        gain: of the tracking task and of the centre of mass, 1/s.
+        dt: control period [s].
+        seed: 0 perturbs nothing.
+
+    Source: Escande, Mansard & Wieber 2014 (humanoids as hierarchies of tasks).
+    """
+    positive("humanoid", gain=gain, dt=dt)
+    between("humanoid", "speed", speed, 0.05, 0.9)
+    between("humanoid", "radius", radius, 0.02, 0.15)
+    between("humanoid", "laps", laps, 1.0, 5.0)
+    body, change = load_robot(robot), VARIATION.drawn(seed)
+    arms = [body.model.joints[k].idx_v for k, n in enumerate(body.model.names) if "arm" in n]
+    q0 = change.posture(body, body.q0, tuple(k for k in range(body.nv) if k not in arms))
+    feet = _feet(body, q0, FEET_GAIN / dt)
+    tracking = PoseTask(gain=gain)
+    start, plane = placement_of(body, q0), change.rotation(body) @ plane_of(body)
+    together = TrackingTogether(tracking, feet)
+    lap = oracle_motion(
+        body, circle(start, radius, 1.0, 1.0, plane=plane), q0, np.linspace(0, 1, 101), together
+    )
+    reference = circle(start, radius, lap.peak_speed_ratio / speed, laps, plane=plane)
+    motion = oracle_motion(body, reference, q0, samples(reference.duration, dt), together)
+    sigma, slip, room = _measured(body, motion, together)
+    certificate = Certificate(
+        (
+            Claim("number of velocities", body.nv, at_least=31),
+            Claim("smallest singular value of hand and feet (m, rad)", sigma, at_least=0.05),
+            Claim("way that the feet move (m, rad)", slip, at_most=1e-8),
+            Claim("room of the centre of mass above the feet [m]", room, at_least=0.03),
+            Claim("required speed over limit", motion.peak_speed_ratio, 0.9 * speed, 1.1 * speed),
+            Claim("position margin [rad]", motion.margin.min(), at_least=0.1),
+        )
+    )
+    return Scenario(
+        robot=body,
+        q0=q0,
+        v0=start_velocity(body, reference, q0, together),
+        reference=reference,
+        tracking=tracking,
+        dt=dt,
+        duration=reference.duration,
+        certificate=certificate,
+        tasks=(
+            *feet,
+            CentreOfMassTask(pin.centerOfMass(body.model, body.scratch, q0), gain, CENTRE_WEIGHT),
+            PostureTask(target=q0, weight=POSTURE_WEIGHT, priority=3),
+        ),
+        motion=motion,
+        variation=VARIATION,
+    )
+
+
+def _feet(body: Robot, q0: Array, gain: float) -> tuple[PoseTask, ...]:
+    """The tasks of feet that stay where they are at the start."""
+    return tuple(
+        PoseTask(placement, gain, FEET_WEIGHT, 1, foot)
+        for foot, placement in zip(FEET, _soles(body, q0), strict=True)
+    )
+
+
+def _soles(body: Robot, q: Array) -> list[Any]:
+    """The placements of the feet (`pinocchio.SE3`)."""
+    return [placement_of(replace(body, frame=foot), q) for foot in FEET]
+
+
+def _measured(
+    body: Robot, motion: OracleMotion, together: TrackingTogether
+) -> tuple[float, float, float]:
+    """Of a motion with the feet in place: what its certificate says of the whole body.
+
+    The smallest singular value of the stacked Jacobian of hand and feet (m, rad); the farthest that
+    a foot is from its place (m, rad); how far the centre of mass stays inside the rectangle about
+    the soles [m], which stand side by side in the axes of the world.
+    """
+    soles = np.array([X.translation[:2] for X in _soles(body, motion.q[0])])
+    lower, upper = soles.min(axis=0) - np.array(SOLE) / 2, soles.max(axis=0) + np.array(SOLE) / 2
+    kinematics, sigma, slip, room = Kinematics(body), [], [], []
+    hand = len(body.task_rows)
+    for q in motion.q:
+        kinematics.update(q)
+        task = together.linearize(kinematics, kinematics.placement(body.frame_id).copy())
+        sigma.append(smallest_singular_value(task.J))
+        slip.append(np.linalg.norm(task.error[hand:]))
+        centre = kinematics.centre_of_mass()[0][:2]
+        room.append(min((centre - lower).min(), (upper - centre).min()))
+    return min(sigma), float(max(slip)), float(min(room))

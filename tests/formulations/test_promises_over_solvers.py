@@ -1,0 +1,105 @@
+"""What laws promise holds with every solver that they can take, afresh or from where it was."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import msgspec
+import pytest
+
+from dikbench.contract_states import State, states
+from dikbench.control_step import control_step
+from dikbench.problem import Formulation, program_of, promises_of
+from dikbench.registry import make_formulation, plugins
+from dikbench.solvers.catalogue import (
+    BACK_ENDS,
+    PRESETS,
+    Solver,
+    is_installed,
+    parse_solver,
+    why_not,
+)
+from dikbench.solvers.checked import make_solve
+from dikbench.status import Status
+from dikbench.testing import ROUNDING, assert_within, check_formulation
+
+# What a solver grumbles about is in its answer's status.
+pytestmark = [
+    pytest.mark.filterwarnings(r"ignore::UserWarning:qpsolvers\."),
+    pytest.mark.filterwarnings(r"ignore::UserWarning:cvxpy\.|dikbench\.solvers\.modelled"),
+]
+
+LAWS = [name for name in sorted(plugins("formulation")) if program_of(make_formulation(name))]
+SOLVERS = [f"{name}[interface={way}]" for name in BACK_ENDS for way in BACK_ENDS[name].interfaces]
+STRIDE = 7
+"""One state in so many is asked in the normal run. No period of the states divides it: all speeds,
+limits, rows and motions before come up."""
+
+
+@cache
+def every_state() -> list[State]:
+    """The states of the contract, robot by robot."""
+    return list(states())
+
+
+def asked(law: str, selector: str) -> tuple[Formulation, Solver]:
+    """A law and a solver; skips a pair that cannot work and says why."""
+    name = selector.partition("[")[0]
+    if not is_installed(name):
+        pytest.skip(f"{name} is not installed")
+    formulation, solver = make_formulation(law), parse_solver(selector)
+    program = program_of(formulation)
+    assert program is not None
+    if program == "cvxpy" and solver.interface != "cvxpy":
+        pytest.skip("a law in cvxpy's words calls the solver through cvxpy, named or not")
+    reason = why_not(solver, program)
+    if reason:
+        pytest.skip(reason)
+    return formulation, solver
+
+
+def kept_promises(formulation: Formulation, solver: Solver, stride: int) -> int:
+    """Assert every promise at every so many states; the number of verified answers.
+
+    A warm solver starts each state from the one before, on the same robot; others forget.
+    """
+    program, answered = program_of(formulation), 0
+    solve, robot = make_solve(solver, program), ""
+    for label, problem in every_state()[::stride]:
+        if solver.interface != "warm" or problem.robot.name != robot:
+            solve, robot = make_solve(solver, program), problem.robot.name
+        solve.begin_run(1)
+        state = State(label, msgspec.structs.replace(problem, relaxed=0))
+        outcome, verdicts = control_step(formulation, state.problem, solve), solve.verdicts()
+        if outcome.status is not Status.OK or verdicts.lied[0]:
+            continue
+        answered += 1
+        tolerance = ROUNDING + solve.calls * float(verdicts.primal[0])
+        for kind in promises_of(formulation):
+            assert_within(state, kind, outcome.velocity, tolerance)
+    return answered
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("law", LAWS)
+def test_promises_are_kept_with_every_solver(law: str, solver: str) -> None:
+    """At every state with a verified answer, and there are some; unverified ones are not judged."""
+    assert kept_promises(*asked(law, solver), STRIDE) >= 5
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("preset", [preset for preset in PRESETS if preset != "default"])
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("law", LAWS)
+def test_promises_are_kept_with_every_preset(law: str, solver: str, preset: str) -> None:
+    """At all states, from loose tolerances to tight ones."""
+    kept_promises(*asked(law, solver.replace("]", f",preset={preset}]")), 1)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("law", LAWS)
+def test_contract_is_kept_with_every_solver(law: str, solver: str) -> None:
+    """The whole contract, asked of a solver that remembers nothing."""
+    formulation, _ = asked(law, solver)
+    check_formulation(formulation, solver)
