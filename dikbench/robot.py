@@ -29,6 +29,8 @@ class Robot:
             six in space, (0, 1, 5) for an arm in the x-y plane. Tasks on the pose keep to them.
         available_acceleration: acceleration limits [rad/s^2] known for this robot, shape (nv,),
             in force only where a scenario or `with_limits` says so; None where none are known.
+        urdf: the file of the model, which has its collision geometry; None: built in code.
+        srdf: the file that says which links cannot collide, if there is one.
     """
 
     name: str
@@ -38,6 +40,8 @@ class Robot:
     q0: Array
     task_rows: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
     available_acceleration: Array | None = None
+    urdf: str | None = None
+    srdf: str | None = None
 
     def __post_init__(self) -> None:
         """Keep laws from writing to the start, which every later trial shares."""

@@ -21,7 +21,7 @@ from dikbench.errors import DikbenchError, unknown
 from dikbench.omnidirectional_base import omnidirectional_base
 from dikbench.planar_arm import planar_arm
 from dikbench.robot import Robot, checked_vector, frame_id, model_limits
-from dikbench.robot_data import from_data, joints
+from dikbench.robot_data import DataModel, data_file, joints
 
 UR_START = (0.3, -1.2, 1.4, -1.7, -1.4, 0.2)
 NOT_PUBLISHED = "no data sheet or manual gives any"
@@ -31,6 +31,8 @@ LWR_TABLE = tuple(
     for turn, d in zip((1, -1, -1, 1, 1, -1, 0), (0.3105, 0, 0.40, 0, 0.39, 0, 0.078), strict=True)
 )
 """a [m], alpha [rad], d [m]; lengths as in Flacco, De Luca & Khatib 2015."""
+UR_PAIRS = "ur_description/srdf/ur5_gripper.srdf"
+"""Of the UR5; its sisters have the same links in the same order."""
 UR_BRAKING = (
     "joint speed limit over 0.5 s, the braking ramp that the safety system enforces "
     "(UR10/CB3 user manual, safety inputs)"
@@ -64,9 +66,10 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
     {
         "panda": CatalogueEntry(
             summary="Franka Emika Panda, 7 joints, fingers locked",
-            model=from_data(
+            model=DataModel(
                 "panda_description/urdf/panda.urdf",
                 moving=joints("panda_joint{}", 1, 7),
+                srdf="panda_description/srdf/panda.srdf",
             ),
             frame="panda_hand_tcp",
             start=(0, -pi / 4, 0, -3 * pi / 4, 0, pi / 2, pi / 4),
@@ -75,7 +78,7 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
         ),
         "ur3": CatalogueEntry(
             summary="Universal Robots UR3, 6 joints, the UR5's small sister",
-            model=from_data("ur_description/urdf/ur3_robot.urdf"),
+            model=DataModel("ur_description/urdf/ur3_robot.urdf", srdf=UR_PAIRS),
             frame="tool0",
             start=UR_START,
             acceleration=(4.32, 4.32, 6.3, 6.4, 6.4, 6.4),
@@ -83,7 +86,7 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
         ),
         "ur5": CatalogueEntry(
             summary="Universal Robots UR5, 6 joints, spherical-like wrist",
-            model=from_data("ur_description/urdf/ur5_robot.urdf"),
+            model=DataModel("ur_description/urdf/ur5_robot.urdf", srdf=UR_PAIRS),
             frame="tool0",
             start=UR_START,
             acceleration=(6.3, 6.3, 6.3, 6.4, 6.4, 6.4),
@@ -91,7 +94,7 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
         ),
         "ur10": CatalogueEntry(
             summary="Universal Robots UR10, 6 joints, the UR5's longer sister",
-            model=from_data("ur_description/urdf/ur10_robot.urdf"),
+            model=DataModel("ur_description/urdf/ur10_robot.urdf", srdf=UR_PAIRS),
             frame="tool0",
             start=UR_START,
             acceleration=(4.32, 4.32, 6.3, 6.4, 6.4, 6.4),
@@ -99,7 +102,9 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
         ),
         "xarm7": CatalogueEntry(
             summary="UFACTORY xArm7, 7 joints; its zero posture is singular",
-            model=from_data("xarm_description/urdf/xarm7.urdf"),
+            model=DataModel(
+                "xarm_description/urdf/xarm7.urdf", srdf="xarm_description/srdf/xarm7.srdf"
+            ),
             frame="link_eef",
             start=(0, -0.5, 0, 1.0, 0, 1.3, 0),
             acceleration=(20,) * 7,
@@ -107,7 +112,7 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
         ),
         "kinova": CatalogueEntry(
             summary="Kinova Jaco 2 (j2s6s200), 6 joints, three of them continuous",
-            model=from_data("kinova_description/robots/kinova.urdf"),
+            model=DataModel("kinova_description/robots/kinova.urdf"),
             frame="j2s6s200_end_effector",
             start=(0, 2.9, 1.3, -2.07, 1.4, 0),
             acceleration=None,
@@ -115,7 +120,7 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
         ),
         "tiago": CatalogueEntry(
             summary="the arm of PAL Robotics' TIAGo, 7 joints, torso, head and wheels locked",
-            model=from_data(
+            model=DataModel(
                 "tiago_description/robots/tiago_no_hand.urdf", moving=joints("arm_{}_joint", 1, 7)
             ),
             frame="arm_tool_link",
@@ -125,8 +130,10 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
         ),
         "talos": CatalogueEntry(
             summary="the left arm of PAL Robotics' Talos, 7 joints, all others locked",
-            model=from_data(
-                "talos_data/robots/talos_reduced.urdf", moving=joints("arm_left_{}_joint", 1, 7)
+            model=DataModel(
+                "talos_data/robots/talos_reduced.urdf",
+                moving=joints("arm_left_{}_joint", 1, 7),
+                srdf="talos_data/srdf/talos.srdf",
             ),
             frame="gripper_left_base_link",
             start=(-0.4, 0.9, 0.6, -1.5, 0.5, 0.5, -0.1),
@@ -231,7 +238,15 @@ def _load_named(name: str) -> Robot:
     limits = model_limits(model).with_interval("effort", None)
     acceleration = None if entry.acceleration is None else np.array(entry.acceleration, dtype=float)
     q0 = pin.integrate(model, pin.neutral(model), np.array(entry.start, dtype=float))
-    return Robot(name, model, entry.frame, limits, q0, entry.task_rows, acceleration)
+    robot = Robot(name, model, entry.frame, limits, q0, entry.task_rows, acceleration)
+    if not isinstance(entry.model, DataModel):
+        return robot
+    srdf = entry.model.srdf
+    return replace(
+        robot,
+        urdf=data_file(entry.model.urdf),
+        srdf=None if srdf is None else data_file(srdf),
+    )
 
 
 def _load_urdf(path: str, frame: str | None) -> Robot:
@@ -252,7 +267,7 @@ def _load_urdf(path: str, frame: str | None) -> Robot:
         raise DikbenchError(f"robot file {path}: name its task frame; valid: {frames}")
     limits = model_limits(model).with_interval("effort", None)
     name = Path(path).stem
-    return Robot(name, model, frame, limits, _well_conditioned_start(model, frame))
+    return Robot(name, model, frame, limits, _well_conditioned_start(model, frame), urdf=path)
 
 
 def _well_conditioned_start(model: Any, frame: str) -> Array:
@@ -271,7 +286,7 @@ def _well_conditioned_start(model: Any, frame: str) -> Array:
         x = middle + spread * half * random.uniform(-1, 1, model.nv)
         q = pin.integrate(model, neutral, x)
         q[limits.q_index] = np.where(np.isfinite(limits.position.upper), x, q[limits.q_index])
-        J = pin.computeFrameJacobian(model, data, q, index, pin.LOCAL)
+        J = pin.computeFrameJacobian(model, data, q, index, pin.LOCAL).reshape(6, model.nv)
         sigma = np.linalg.svd(J, compute_uv=False)[min(6, model.nv) - 1]
         if sigma > best_sigma:
             best, best_sigma = q, float(sigma)

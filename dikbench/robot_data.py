@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
-from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,27 +12,38 @@ import pinocchio as pin
 from dikbench.errors import DikbenchError
 
 
-def from_data(path: str, moving: tuple[str, ...] = ()) -> Callable[[], Any]:
-    """A function that builds the Pinocchio model of a URDF below the package's folder `robots`.
+@dataclass(frozen=True)
+class DataModel:
+    """A robot of the package's folder `robots`.
 
-    Args:
-        path: of the file.
+    Attributes:
+        urdf: path of the file.
         moving: names of the joints that move, the others are locked at zero; empty: all.
+        srdf: path of the file that says which links cannot collide, if there is one.
     """
 
-    def build() -> Any:
-        model = pin.buildModelFromUrdf(str(_data_folder() / path))
-        if not moving:
+    urdf: str
+    moving: tuple[str, ...] = ()
+    srdf: str | None = None
+
+    def __call__(self) -> Any:
+        """Build the Pinocchio model."""
+        model = pin.buildModelFromUrdf(data_file(self.urdf))
+        if not self.moving:
             return model
+        moving = self.moving
         locked = [index for index, name in enumerate(model.names) if index and name not in moving]
         return pin.buildReducedModel(model, locked, pin.neutral(model))
-
-    return build
 
 
 def joints(pattern: str, first: int, last: int) -> tuple[str, ...]:
     """Names with consecutive numbers in the place of the braces of a pattern."""
     return tuple(pattern.format(number) for number in range(first, last + 1))
+
+
+def data_file(path: str) -> str:
+    """Where a file of the package's folder `robots` is installed."""
+    return str(_data_folder() / path)
 
 
 def _data_folder() -> Path:
