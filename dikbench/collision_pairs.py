@@ -37,6 +37,7 @@ class CollisionPairs:
 
     Attributes:
         names: of the two, pair by pair.
+        joints: that carry them, 0 for the world.
         left_out: names of the pairs of bodies left out because of the safe start.
     """
 
@@ -58,14 +59,13 @@ class CollisionPairs:
                 if body.parentJoint != 0:
                     self._geometry.addCollisionPair(pin.CollisionPair(index, added))
         self.names = tuple(self._names(pair) for pair in self._geometry.collisionPairs)
-        moved = _moved(robot.model)
         objects = self._geometry.geometryObjects
-        self._signs = np.array(
-            [
-                moved[objects[pair.second].parentJoint] - moved[objects[pair.first].parentJoint]
-                for pair in self._geometry.collisionPairs
-            ]
-        ).reshape(len(self.names), robot.nv)
+        self.joints: tuple[tuple[int, int], ...] = tuple(
+            (objects[pair.first].parentJoint, objects[pair.second].parentJoint)
+            for pair in self._geometry.collisionPairs
+        )
+        moved = _moved(robot.model)
+        self._signs = np.array([moved[b] - moved[a] for a, b in self.joints])
         self._place()
 
     def __len__(self) -> int:

@@ -18,6 +18,7 @@ from scenarios.joint_limit_approach import joint_limit_approach
 from scenarios.joint_limit_crossing import joint_limit_crossing
 from scenarios.log_derivative_drift import log_derivative_drift
 from scenarios.near_miss import near_miss
+from scenarios.obstacle import obstacle
 from scenarios.pick_and_place import pick_and_place
 from scenarios.reach import reach
 from scenarios.speed_sweep import speed_sweep
@@ -41,6 +42,7 @@ SCENARIOS: Mapping[str, Callable[..., Scenario]] = MappingProxyType(
         "speed-sweep": speed_sweep,
         "hexagon": hexagon,
         "workspace-boundary": workspace_boundary,
+        "obstacle": obstacle,
         "pick-and-place": pick_and_place,
         "back-and-forth": back_and_forth,
         "csv": csv_poses,
