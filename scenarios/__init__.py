@@ -21,6 +21,7 @@ from scenarios.near_miss import near_miss
 from scenarios.obstacle import obstacle
 from scenarios.pick_and_place import pick_and_place
 from scenarios.reach import reach
+from scenarios.self_collision import self_collision
 from scenarios.speed_sweep import speed_sweep
 from scenarios.start_outside import start_outside
 from scenarios.step import step
@@ -43,6 +44,7 @@ SCENARIOS: Mapping[str, Callable[..., Scenario]] = MappingProxyType(
         "hexagon": hexagon,
         "workspace-boundary": workspace_boundary,
         "obstacle": obstacle,
+        "self-collision": self_collision,
         "pick-and-place": pick_and_place,
         "back-and-forth": back_and_forth,
         "csv": csv_poses,
