@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Literal
 
@@ -27,6 +27,7 @@ from dikbench.variation import Variation
 from scenarios.common import (
     between,
     duration_at,
+    influence_distance,
     limits_in_force,
     positive,
     samples,
@@ -75,6 +76,7 @@ POLE = 0.3
 """Length of the capsule's segment [m]."""
 
 MARGIN = 0.01
+"""Distance to keep [m]."""
 
 VARIATION = Variation(start=0.03, timing=0.1)
 
@@ -140,7 +142,10 @@ def obstacle(
     _, reference = _swing(arm, middle, swing, duration)
     motion = oracle_motion(arm, reference, q0, samples(duration, dt, most=100))
     half_way = motion.q[len(motion.q) // 2]
-    constraint = _in_the_way(arm, half_way, swing.joint, where, shape, depth)
+    influence = influence_distance(acceleration=acceleration)
+    constraint = replace(
+        _in_the_way(arm, half_way, swing.joint, where, shape, depth), influence=influence
+    )
     distance = constraint.distances(arm, motion.q)
     claims = [
         Claim("least distance of the reference's motion [m]", distance.min(), -0.1, -0.8 * depth),

@@ -23,6 +23,7 @@ from dikbench.variation import Variation
 from scenarios.common import (
     between,
     duration_at,
+    influence_distance,
     limits_in_force,
     positive,
     samples,
@@ -45,6 +46,7 @@ WAYS: Mapping[str, tuple[float, ...]] = MappingProxyType(
 """From the start into the arm itself [rad]."""
 
 MARGIN = 0.01
+"""Distance to keep [m]."""
 
 VARIATION = Variation(start=0.03, timing=0.1)
 
@@ -89,7 +91,9 @@ def self_collision(
     duration = duration_at(arm, _there_and_back(arm, q0, way, 1.0), q0, speed) * change.pace
     reference = _there_and_back(arm, q0, way, duration)
     motion = oracle_motion(arm, reference, q0, samples(duration, dt, most=100))
-    constraint = CollisionConstraint(margin=MARGIN)
+    constraint = CollisionConstraint(
+        margin=MARGIN, influence=influence_distance(acceleration=acceleration)
+    )
     distance = constraint.distances(arm, motion.q)
     certificate = Certificate(
         (

@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.array import Array
+from dikbench.box import viable_brake
 from dikbench.collision_pairs import CollisionPairs
 from dikbench.errors import DikbenchError
 from dikbench.kinematics import Kinematics
@@ -22,6 +23,9 @@ STILL: Final = 1e-6
 
 WAY_BACK: Final = 0.1
 """Share of the speed that the velocity limits allow at which a distance below the margin grows."""
+
+BRAKING: Final = 0.5
+"""Share of the acceleration limits that a row counts on: other rows have joints to brake, too."""
 
 UNLIMITED: Final = 1.0
 """Speed [rad/s or m/s] that counts for joints without a velocity limit on the way back."""
@@ -43,6 +47,11 @@ class CollisionConstraint:
     leave no velocity: an infeasible step. Farther than the influence distance, or where no joint
     changes the distance to first order, the row is vacuous: 0 v <= 1.
 
+    Where acceleration limits are in force the row brakes as `dikbench.box.viable_brake` does,
+    counting on half of what they allow, 0.5 sum_i |g_i| a_i [m/s^2], and asks for no more change
+    of g . v in this step than that; a distance that is missed by joints that brake so slowly, or
+    that had no row early enough, then falls below the margin.
+
     With more pairs than `rows` the nearest ones have the rows. A pair nearer than the influence
     distance is then without a row only while `rows` others are nearer than it is.
 
@@ -53,7 +62,7 @@ class CollisionConstraint:
         self_collision: whether the robot's bodies keep clear of each other.
         margin: distance to keep [m].
         influence: distance below which a pair has a row [m]; to be larger than the margin by what
-            two bodies can come nearer in one step.
+            two bodies can come nearer in one step, or while they brake.
         rows: number of rows, if there are so many pairs.
 
     Source: Faverjon & Tournassoud 1987 (velocity damper); Kanoun et al. 2011.
@@ -114,6 +123,12 @@ class CollisionConstraint:
             room = (phi[chosen[near]] - self.margin) / dt
             if room.min(initial=0.0) < 0:
                 room = np.maximum(room, -WAY_BACK * np.abs(g) @ _speeds(robot))
+            acceleration = robot.limits.acceleration
+            if acceleration is not None and v_prev is not None:
+                a = np.minimum(acceleration.upper, -acceleration.lower)
+                slow = BRAKING * np.abs(g) @ a
+                room = np.minimum(room, viable_brake(room * dt, slow, dt))
+                room = np.maximum(room, -g @ v_prev - slow * dt)
             G[near] = -g / length[:, None]
             h[near] = room / length
         return G, h

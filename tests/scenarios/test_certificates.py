@@ -29,13 +29,6 @@ from scenarios.joint_limit_crossing import CROSSINGS
 from scenarios.obstacle import SWINGS
 from scenarios.singular_postures import SINGULAR_POSTURES
 
-SHAPES = ("sphere", "capsule", "box")
-OBSTRUCTED = {
-    robot: [where for where, robots in SWINGS.items() if robot in robots]
-    for robot in {robot: None for robots in SWINGS.values() for robot in robots}
-}
-"""What an obstacle may be in the way of, robot by robot."""
-
 # What a robot needs beside its name, and variants that are cases of their own.
 EXTRA = {
     **{
@@ -45,10 +38,11 @@ EXTRA = {
     ("near-miss", "ur5"): ["", "miss=0", "miss=0.005", "miss=0.2,speed=0.1"],
     ("joint-limit-crossing", "panda"): ["", "acceleration=true"],
     ("speed-sweep", "panda"): ["speed=0.3", "speed=1.3", "speed=2"],
-    **{
-        ("obstacle", robot): [f"where={where},shape={shape}" for shape in SHAPES for where in ways]
-        for robot, ways in OBSTRUCTED.items()
-    },
+    ("obstacle", "panda"): [
+        f"where={where},shape={shape}" for where in SWINGS for shape in ("sphere", "capsule", "box")
+    ],
+    ("obstacle", "xarm7"): ["", "where=elbow"],
+    ("obstacle", "lwr"): ["where=elbow"],
 }
 SEEDS = (1, 2, 3, 4, 5)
 

@@ -306,6 +306,29 @@ def test_what_no_joint_can_change_has_no_say() -> None:
     assert answer.progress == pytest.approx(1.0, abs=1e-3)
 
 
+def test_rows_ask_for_no_more_than_the_joints_can_brake() -> None:
+    """From any speed some velocity within reach of it keeps each row by itself.
+
+    Without acceleration limits, or with no velocity to change, rows do not brake.
+    """
+    robot = load_robot("ur5")
+    slow = robot.with_limits(acceleration=robot.available_acceleration)
+    assert slow.limits.acceleration is not None
+    reach = DT * slow.limits.acceleration.upper
+    constraint = CollisionConstraint(ALL, influence=1.0)
+    random, braking = np.random.default_rng(8), 0
+    for _ in range(100):
+        q = pin.integrate(robot.model, robot.q0, random.uniform(-0.7, 0.7, 6))
+        before = random.uniform(-1, 1, 6)
+        G, h = constraint.linearize(at(slow, q), before, DT)
+        assert (G @ before - np.abs(G) @ reach <= h + 1e-12).all()
+        _, free = constraint.linearize(at(robot, q), before, DT)
+        _, still = constraint.linearize(at(slow, q), None, DT)
+        np.testing.assert_array_equal(free, still)
+        braking += int((h < free - 1e-9).sum())
+    assert braking > 100
+
+
 def test_remainder_is_of_second_order() -> None:
     """Half the step, a quarter of the remainder; it and the slope make up the change."""
     robot = load_robot("panda")
@@ -318,6 +341,20 @@ def test_remainder_is_of_second_order() -> None:
     ratio = sizes[0] / sizes[1]
     assert np.median(ratio) == pytest.approx(4.0, abs=0.2)
     assert np.abs(sizes[0]).max() < 1e-3
+
+
+def test_rows_do_not_depend_on_what_was_asked_before() -> None:
+    """To the bit: distances of boxes and cylinders are iterative, and start from the same guess."""
+    robot = load_robot("tiago")
+    constraint = CollisionConstraint(ALL, rows=500, influence=10.0)
+    first = constraint.linearize(at(robot, robot.q0), None, DT)
+    random = np.random.default_rng(0)
+    for _ in range(20):
+        q = pin.integrate(robot.model, robot.q0, random.uniform(-1, 1, robot.nv))
+        constraint.linearize(at(robot, q), None, DT)
+    again = constraint.linearize(at(robot, robot.q0), None, DT)
+    np.testing.assert_array_equal(first[0], again[0])
+    np.testing.assert_array_equal(first[1], again[1])
 
 
 def test_distances_are_the_least_of_the_pairs() -> None:
