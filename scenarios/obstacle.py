@@ -84,8 +84,8 @@ VARIATION = Variation(start=0.03, timing=0.1)
 def obstacle(
     robot: Literal["panda", "ur3", "ur5", "ur10", "xarm7", "lwr"] = "panda",
     *,
-    where: Where = "hand",
-    shape: Shape = "sphere",
+    where: Literal["hand", "elbow"] = "hand",
+    shape: Literal["sphere", "capsule", "box"] = "sphere",
     depth: float = 0.03,
     speed: float = 0.3,
     gain: float = 5.0,
