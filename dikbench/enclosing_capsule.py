@@ -37,13 +37,13 @@ def _along(points: Array, axis: Array) -> tuple[Array, Array, float]:
     flat = points - np.outer(height, axis)
     centre = _circle_centre(flat)
     off_axis = np.linalg.norm(flat - centre, axis=1)
-    radius = float(off_axis.max()) + HAIR
+    radius = float(off_axis.max())
     # A point may lie in the cap beyond the segment, as far as its distance from the axis allows.
     cap = np.sqrt(radius**2 - off_axis**2)
     low, high = float((height + cap).min()), float((height - cap).max())
     if low > high:  # one sphere about anything between does
         low = high = (low + high) / 2
-    return centre + low * axis, centre + high * axis, radius
+    return centre + low * axis, centre + high * axis, radius + HAIR
 
 
 def _circle_centre(points: Array) -> Array:

@@ -47,7 +47,8 @@ class Kinematics:
     def spatial_jacobian(self) -> Array:
         """The twist (linear; angular) that each joint gives, at the world's origin, (6, nv).
 
-        In the world's axes: a wrench there times it is the power of each joint on a body.
+        In the world's axes. A wrench there times column k: its power on what joint k moves, per
+        unit of the joint's speed.
         """
         J: Array = self._data.J
         return J if J.ndim == 2 else J[:, None]

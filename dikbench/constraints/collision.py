@@ -120,15 +120,7 @@ class CollisionConstraint:
             length = np.linalg.norm(g, axis=1)
             moving = length > STILL
             near, g, length = near[moving], g[moving], length[moving]
-            room = (phi[chosen[near]] - self.margin) / dt
-            if room.min(initial=0.0) < 0:
-                room = np.maximum(room, -WAY_BACK * np.abs(g) @ _speeds(robot))
-            acceleration = robot.limits.acceleration
-            if acceleration is not None and v_prev is not None:
-                a = np.minimum(acceleration.upper, -acceleration.lower)
-                slow = BRAKING * np.abs(g) @ a
-                room = np.minimum(room, viable_brake(room * dt, slow, dt))
-                room = np.maximum(room, -g @ v_prev - slow * dt)
+            room = _room(robot, phi[chosen[near]] - self.margin, g, v_prev, dt)
             G[near] = -g / length[:, None]
             h[near] = room / length
         return G, h
@@ -148,7 +140,8 @@ class CollisionConstraint:
             phi(q_(k+1)) - phi(q_k) - g(q_k) . (q_(k+1) - q_k)
 
         of the pairs that are below the influence distance at the start of the step, 0 elsewhere.
-        A motion whose steps keep the rows stays above margin + min(remainders) [m].
+        A motion whose steps keep the rows stays above margin + min(remainders) [m] where no
+        acceleration limits soften them.
 
         Returns:
             (n, p) [m] for p pairs.
@@ -164,6 +157,28 @@ class CollisionConstraint:
                 predicted.append(phi[-1] + pairs.gradients(kinematics, everything) @ step)
         before, after = np.array(phi[:-1]), np.array(phi[1:])
         return np.where(before < self.influence, after - np.array(predicted), 0.0)
+
+
+def _room(robot: Robot, spare: Array, g: Array, v_prev: Array | None, dt: float) -> Array:
+    """How fast each pair may come nearer, (k,) [m/s], negative where it has to part.
+
+    Args:
+        robot: the robot, with its limits.
+        spare: distances less the margin, (k,) [m].
+        g: gradients of the distances, (k, nv).
+        v_prev: the velocity applied last, (nv,), or None.
+        dt: control period [s].
+    """
+    room, can = spare / dt, np.abs(g)
+    if room.min(initial=0.0) < 0:
+        room = np.maximum(room, -WAY_BACK * can @ _speeds(robot))
+    acceleration = robot.limits.acceleration
+    if acceleration is None or v_prev is None:
+        return room
+    brake = BRAKING * can @ np.minimum(acceleration.upper, -acceleration.lower)
+    room = np.minimum(room, viable_brake(spare, brake, dt))
+    braked: Array = np.maximum(room, -g @ v_prev - brake * dt)
+    return braked
 
 
 @lru_cache(maxsize=32)
