@@ -68,7 +68,7 @@ def _fitted(urdf: str) -> tuple[Any, Any]:
     for body in found.geometryObjects:
         shape, placement = body.geometry, body.placement
         if hasattr(shape, "vertices"):
-            vertices = np.asarray(shape.vertices()).reshape(-1, 3) * body.meshScale
+            vertices = np.asarray(shape.vertices()).reshape(-1, 3)  # scaled already
             shape, within = capsule(*enclosing_capsule(vertices))
             placement = placement * within
         bodies.addGeometryObject(

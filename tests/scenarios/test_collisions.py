@@ -105,6 +105,25 @@ def test_a_hand_gives_way_and_comes_back_or_stops() -> None:
     assert _errors(stuck, scenario)[-1] > 0.1
 
 
+@pytest.mark.parametrize("where", ["hand", "elbow"])
+def test_what_is_in_the_way_is_in_the_way_of_the_hand_or_of_the_elbow(where: str) -> None:
+    """Half way the hand itself is `depth` inside, wherever the null space is; or far from it."""
+    scenario = make_scenario(f"obstacle[robot=xarm7,where={where}]")
+    claims = {claim.quantity: claim.value for claim in scenario.certificate.claims}
+    assert ("distance of the hand on its path [m]" in claims) == (where == "hand")
+    assert scenario.motion is not None
+    kinematics = Kinematics(scenario.robot)
+    kinematics.update(scenario.motion.q[len(scenario.motion.q) // 2])
+    pairs = _constraint(scenario).pairs(scenario.robot)
+    hand = pairs.names.index(("link7_0", "obstacle_0"))
+    distance = pairs.distances(kinematics)[hand]
+    if where == "hand":
+        assert distance == pytest.approx(-0.03, abs=1e-6)
+        assert claims["distance of the hand on its path [m]"] == distance
+    else:
+        assert distance > 0.1
+
+
 def test_braking_keeps_clear_with_little_acceleration() -> None:
     """The UR5's 6.3 rad/s^2: the margin is kept as well, and every step has an answer."""
     scenario = make_scenario("obstacle[robot=ur5,acceleration=true,speed=0.6]")

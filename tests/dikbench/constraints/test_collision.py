@@ -21,9 +21,10 @@ from dikbench import (
     solve_dik,
 )
 from dikbench.array import Array
-from dikbench.collision_bodies import LINK_RADIUS
+from dikbench.collision_bodies import LINK_RADIUS, collision_bodies
 from dikbench.collision_pairs import CollisionPairs
 from dikbench.kinematics import Kinematics
+from dikbench.robot_data import data_file
 
 DT = 0.01
 SPHERE = SphereObstacle((0.45, 0.3, 0.5), 0.1)
@@ -166,6 +167,12 @@ def test_safe_start_is_clear_and_neighbours_are_no_pairs(name: str) -> None:
     assert pairs.distances(at(robot, robot.q0)).min() >= 0.01
     assert len(pairs) >= 1
     assert not set(pairs.names) & set(pairs.left_out)
+    for first, second in pairs.joints:
+        assert first != second
+        assert robot.model.parents[second] != first
+        assert robot.model.parents[first] != second
+    # Neighbours touch: they are not even looked at.
+    assert name not in ("planar4r", "panda") or pairs.left_out == ()
 
 
 def test_srdf_and_safe_start_decide_what_is_left_out() -> None:
@@ -407,6 +414,23 @@ def test_missing_mesh_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(DikbenchError, match=r"collision geometry: .*tip\.stl") as caught:
         CollisionConstraint([SPHERE]).pairs(robot)
     assert "\n" not in str(caught.value)
+
+
+def test_scaled_meshes_have_scaled_bodies(tmp_path: Path) -> None:
+    """Twice the Panda's first link: a capsule twice as thick and long."""
+    mesh = data_file("panda_description/meshes/collision/link1.stl")
+    urdf = tmp_path / "arm.urdf"
+    urdf.write_text(
+        '<robot name="arm"><link name="base"/><link name="tip"><collision><geometry>'
+        f'<mesh filename="{mesh}" scale="2 2 2"/></geometry></collision></link>'
+        '<joint name="turn" type="revolute"><parent link="base"/><child link="tip"/>'
+        '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
+    )
+    large = collision_bodies(load_robot(str(urdf), "tip")).geometryObjects[0].geometry
+    bodies = collision_bodies(load_robot("panda")).geometryObjects
+    (own,) = (body.geometry for body in bodies if body.name == "panda_link1_0")
+    assert large.radius == pytest.approx(2 * own.radius)
+    assert large.halfLength == pytest.approx(2 * own.halfLength)
 
 
 def test_a_urdf_of_ones_own_has_its_primitive_shapes(tmp_path: Path) -> None:
