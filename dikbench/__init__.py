@@ -10,8 +10,9 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from dikbench.constraints import Constraint, TorqueConstraint
+    from dikbench.constraints import CollisionConstraint, Constraint, TorqueConstraint
     from dikbench.errors import DikbenchError, Infeasible, SolverFailed
+    from dikbench.obstacles import BoxObstacle, CapsuleObstacle, SphereObstacle
     from dikbench.one_step import DikAnswer, solve_dik
     from dikbench.problem import DikProblem, Formulation, Solve
     from dikbench.quadratic_program import QuadraticProgram
@@ -32,7 +33,10 @@ if TYPE_CHECKING:
     from dikbench.tidy import Results, load_results
 
 _HOME = {
+    "BoxObstacle": "obstacles",
+    "CapsuleObstacle": "obstacles",
     "CentreOfMassTask": "tasks",
+    "CollisionConstraint": "constraints",
     "Constraint": "constraints",
     "DampingTask": "tasks",
     "DikAnswer": "one_step",
@@ -51,6 +55,7 @@ _HOME = {
     "Scenario": "scenario",
     "Solve": "problem",
     "SolverFailed": "errors",
+    "SphereObstacle": "obstacles",
     "Status": "status",
     "Task": "tasks",
     "TorqueConstraint": "constraints",
@@ -60,7 +65,10 @@ _HOME = {
 }
 
 __all__ = [
+    "BoxObstacle",
+    "CapsuleObstacle",
     "CentreOfMassTask",
+    "CollisionConstraint",
     "Constraint",
     "DampingTask",
     "DikAnswer",
@@ -79,6 +87,7 @@ __all__ = [
     "Scenario",
     "Solve",
     "SolverFailed",
+    "SphereObstacle",
     "Status",
     "Task",
     "TorqueConstraint",

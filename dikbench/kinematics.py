@@ -43,6 +43,20 @@ class Kinematics:
         J: Array = pin.getFrameJacobian(self._model, self._data, frame, LOCAL)
         return J if J.ndim == 2 else J[:, None]  # of a single joint Pinocchio makes a vector
 
+    @property
+    def spatial_jacobian(self) -> Array:
+        """The twist (linear; angular) that each joint gives, at the world's origin, (6, nv).
+
+        In the world's axes. A wrench there times column k: its power on what joint k moves, per
+        unit of the joint's speed.
+        """
+        J: Array = self._data.J
+        return J if J.ndim == 2 else J[:, None]
+
+    def place_bodies(self, geometry: Any, placed: Any) -> None:
+        """Put the bodies of a `pinocchio.GeometryModel`, its data, where the robot has them."""
+        pin.updateGeometryPlacements(self._model, self._data, geometry, placed)
+
     def centre_of_mass(self) -> tuple[Array, Array]:
         """Centre of mass (3,) [m] and its Jacobian (3, nv), in the axes of the world.
 

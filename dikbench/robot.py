@@ -32,6 +32,8 @@ class Robot:
             in force only where a scenario or `with_limits` says so; None where none are known.
         visuals: builds what is drawn of it (`pinocchio.GeometryModel`), which may raise ValueError
             where a mesh is missing; None where there is only the chain of joints.
+        urdf: the file of the model, which has its collision geometry; None: built in code.
+        srdf: the file that says which links cannot collide, if there is one.
     """
 
     name: str
@@ -42,6 +44,8 @@ class Robot:
     task_rows: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
     available_acceleration: Array | None = None
     visuals: Callable[[], Any] | None = None
+    urdf: str | None = None
+    srdf: str | None = None
 
     def __post_init__(self) -> None:
         """Keep laws from writing to the start, which every later trial shares."""

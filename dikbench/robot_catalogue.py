@@ -21,7 +21,7 @@ from dikbench.errors import DikbenchError, unknown
 from dikbench.omnidirectional_base import omnidirectional_base
 from dikbench.planar_arm import planar_arm
 from dikbench.robot import Robot, checked_vector, frame_id, model_limits
-from dikbench.robot_data import DataModel, joints, urdf_visuals
+from dikbench.robot_data import DataModel, data_file, joints, urdf_visuals
 
 UR_START = (0.3, -1.2, 1.4, -1.7, -1.4, 0.2)
 NOT_PUBLISHED = "no data sheet or manual gives any"
@@ -43,6 +43,8 @@ HALF_SITTING = (
 """Base, left and right leg, torso, left and right arm, head: Talos' own half-sitting posture (its
 SRDF), the elbows bent from 0.5 to 1.2 rad and the arms 0.4 rad farther from the body, away from
 limits."""
+UR_PAIRS = "ur_description/srdf/ur5_gripper.srdf"
+"""Of the UR5; its sisters have the same links in the same order."""
 UR_BRAKING = (
     "joint speed limit over 0.5 s, the braking ramp that the safety system enforces "
     "(UR10/CB3 user manual, safety inputs)"
@@ -79,6 +81,7 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
             model=DataModel(
                 "panda_description/urdf/panda.urdf",
                 moving=joints("panda_joint{}", 1, 7),
+                srdf="panda_description/srdf/panda.srdf",
             ),
             frame="panda_hand_tcp",
             start=(0, -pi / 4, 0, -3 * pi / 4, 0, pi / 2, pi / 4),
@@ -87,7 +90,7 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
         ),
         "ur3": CatalogueEntry(
             summary="Universal Robots UR3, 6 joints, the UR5's small sister",
-            model=DataModel("ur_description/urdf/ur3_robot.urdf"),
+            model=DataModel("ur_description/urdf/ur3_robot.urdf", srdf=UR_PAIRS),
             frame="tool0",
             start=UR_START,
             acceleration=(4.32, 4.32, 6.3, 6.4, 6.4, 6.4),
@@ -95,7 +98,7 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
         ),
         "ur5": CatalogueEntry(
             summary="Universal Robots UR5, 6 joints, spherical-like wrist",
-            model=DataModel("ur_description/urdf/ur5_robot.urdf"),
+            model=DataModel("ur_description/urdf/ur5_robot.urdf", srdf=UR_PAIRS),
             frame="tool0",
             start=UR_START,
             acceleration=(6.3, 6.3, 6.3, 6.4, 6.4, 6.4),
@@ -103,7 +106,7 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
         ),
         "ur10": CatalogueEntry(
             summary="Universal Robots UR10, 6 joints, the UR5's longer sister",
-            model=DataModel("ur_description/urdf/ur10_robot.urdf"),
+            model=DataModel("ur_description/urdf/ur10_robot.urdf", srdf=UR_PAIRS),
             frame="tool0",
             start=UR_START,
             acceleration=(4.32, 4.32, 6.3, 6.4, 6.4, 6.4),
@@ -111,7 +114,9 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
         ),
         "xarm7": CatalogueEntry(
             summary="UFACTORY xArm7, 7 joints; its zero posture is singular",
-            model=DataModel("xarm_description/urdf/xarm7.urdf"),
+            model=DataModel(
+                "xarm_description/urdf/xarm7.urdf", srdf="xarm_description/srdf/xarm7.srdf"
+            ),
             frame="link_eef",
             start=(0, -0.5, 0, 1.0, 0, 1.3, 0),
             acceleration=(20,) * 7,
@@ -138,7 +143,9 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
         "talos": CatalogueEntry(
             summary="the left arm of PAL Robotics' Talos, 7 joints, all others locked",
             model=DataModel(
-                "talos_data/robots/talos_reduced.urdf", moving=joints("arm_left_{}_joint", 1, 7)
+                "talos_data/robots/talos_reduced.urdf",
+                moving=joints("arm_left_{}_joint", 1, 7),
+                srdf="talos_data/srdf/talos.srdf",
             ),
             frame="gripper_left_base_link",
             start=(-0.4, 0.9, 0.6, -1.5, 0.5, 0.5, -0.1),
@@ -262,8 +269,16 @@ def _load_named(name: str) -> Robot:
     limits = model_limits(model).with_interval("effort", None)
     acceleration = None if entry.acceleration is None else np.array(entry.acceleration, dtype=float)
     q0 = pin.integrate(model, pin.neutral(model), np.array(entry.start, dtype=float))
-    visuals = entry.model.visuals if isinstance(entry.model, DataModel) else None
-    return Robot(name, model, entry.frame, limits, q0, entry.task_rows, acceleration, visuals)
+    robot = Robot(name, model, entry.frame, limits, q0, entry.task_rows, acceleration)
+    if not isinstance(entry.model, DataModel):
+        return robot
+    srdf = entry.model.srdf
+    return replace(
+        robot,
+        visuals=entry.model.visuals,
+        urdf=data_file(entry.model.urdf),
+        srdf=None if srdf is None else data_file(srdf),
+    )
 
 
 def _load_urdf(path: str, frame: str | None) -> Robot:
@@ -286,7 +301,7 @@ def _load_urdf(path: str, frame: str | None) -> Robot:
     name = Path(path).stem
     start = _well_conditioned_start(model, frame)
     visuals = partial(urdf_visuals, model, path, Path(path).absolute().parent)
-    return Robot(name, model, frame, limits, start, visuals=visuals)
+    return Robot(name, model, frame, limits, start, visuals=visuals, urdf=path)
 
 
 def _well_conditioned_start(model: Any, frame: str) -> Array:

@@ -15,18 +15,20 @@ from dikbench.errors import DikbenchError
 
 @dataclass(frozen=True)
 class DataModel:
-    """A model of a URDF below the package's folder `robots`; a call builds the Pinocchio model.
+    """A robot of the package's folder `robots`; a call builds its Pinocchio model.
 
     Attributes:
-        path: of the file.
+        urdf: path of the file.
         moving: names of the joints that move, the others are locked at zero; empty: all.
         root: makes the joint (`root_joint`, which moves) between world and robot; None: it is
             fixed.
+        srdf: path of the file that says which links cannot collide, if there is one.
     """
 
-    path: str
+    urdf: str
     moving: tuple[str, ...] = ()
     root: Callable[[], Any] | None = None
+    srdf: str | None = None
 
     def __call__(self) -> Any:
         """Build the Pinocchio model."""
@@ -37,15 +39,14 @@ class DataModel:
 
     def visuals(self) -> Any:
         """Build what is drawn of it, meshes among them (`pinocchio.GeometryModel`)."""
-        model, folder = self._whole(), _data_folder()
-        file = str(folder / self.path)
-        visuals = urdf_visuals(model, file, folder.parents[1])
+        model = self._whole()
+        visuals = urdf_visuals(model, data_file(self.urdf), _data_folder().parents[1])
         if not self.moving:
             return visuals
         return pin.buildReducedModel(model, visuals, self._locked(model), pin.neutral(model))[1]
 
     def _whole(self) -> Any:
-        file = str(_data_folder() / self.path)
+        file = data_file(self.urdf)
         if self.root is None:
             return pin.buildModelFromUrdf(file)
         return pin.buildModelFromUrdf(file, self.root())
@@ -72,6 +73,11 @@ def urdf_visuals(model: Any, file: str, packages: Path) -> Any:
 def joints(pattern: str, first: int, last: int) -> tuple[str, ...]:
     """Names with consecutive numbers in the place of the braces of a pattern."""
     return tuple(pattern.format(number) for number in range(first, last + 1))
+
+
+def data_file(path: str) -> str:
+    """Where a file of the package's folder `robots` is installed."""
+    return str(_data_folder() / path)
 
 
 def _data_folder() -> Path:

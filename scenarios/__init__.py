@@ -19,8 +19,10 @@ from scenarios.joint_limit_approach import joint_limit_approach
 from scenarios.joint_limit_crossing import joint_limit_crossing
 from scenarios.log_derivative_drift import log_derivative_drift
 from scenarios.near_miss import near_miss
+from scenarios.obstacle import obstacle
 from scenarios.pick_and_place import pick_and_place
 from scenarios.reach import reach
+from scenarios.self_collision import self_collision
 from scenarios.speed_sweep import speed_sweep
 from scenarios.start_outside import start_outside
 from scenarios.step import step
@@ -44,6 +46,8 @@ SCENARIOS: Mapping[str, Callable[..., Scenario]] = MappingProxyType(
         "hexagon": hexagon,
         "workspace-boundary": workspace_boundary,
         "torque-limited": torque_limited,
+        "obstacle": obstacle,
+        "self-collision": self_collision,
         "pick-and-place": pick_and_place,
         "back-and-forth": back_and_forth,
         "humanoid": humanoid,

@@ -54,6 +54,11 @@ def limits_in_force(robot: Robot, *, acceleration: bool) -> Robot:
     return robot.with_limits(acceleration=robot.available_acceleration)
 
 
+def influence_distance(*, acceleration: bool) -> float:
+    """Distance [m] from which a collision is looked out for: farther where joints brake slowly."""
+    return 0.5 if acceleration else 0.1
+
+
 def secondary_tasks(
     robot: Robot, posture: Array, tracking: TrackingTask = POSE
 ) -> tuple[Task, ...]:

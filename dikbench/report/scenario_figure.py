@@ -10,8 +10,11 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.array import Array
+from dikbench.constraints import CollisionConstraint
 from dikbench.errors import DikbenchError
+from dikbench.obstacles import Obstacle
 from dikbench.registry import make_scenario
+from dikbench.report.obstacle_surface import surface
 from dikbench.report.style import COLOURS, style
 from dikbench.robot import Robot
 from dikbench.scenario import Scenario
@@ -58,7 +61,7 @@ def draw_scenario(selector: str, file: Path) -> None:
 
 
 def _draw_way(axes: Any, scenario: Scenario, planar: bool) -> None:
-    """The path of the target, and the robot as a stick figure at a few instants."""
+    """The path of the target, the robot as a stick figure at a few instants, what is in its way."""
     used = slice(0, 2) if planar else slice(0, 3)
     taus = np.linspace(0.0, scenario.reference.duration, PATH_POINTS)
     path = np.array([scenario.reference.placement(tau).translation for tau in taus])[:, used]
@@ -80,7 +83,11 @@ def _draw_way(axes: Any, scenario: Scenario, planar: bool) -> None:
             linewidth=2.6 - 0.35 * number,
             label=f"robot at {time:.2f} s",
         )
-    points = np.vstack([path, *(points[:, used] for points in sticks)])
+    surfaces = [surface(obstacle) for obstacle in _obstacles(scenario)]
+    for shape in surfaces:
+        axes.plot_surface(*np.moveaxis(shape, 2, 0), color=COLOURS[5], alpha=0.5)
+    shapes = [shape.reshape(-1, 3) for shape in surfaces]
+    points = np.vstack([path, *(points[:, used] for points in [*sticks, *shapes])])
     middle, half = (points.max(0) + points.min(0)) / 2, 0.55 * np.ptp(points, axis=0).max()
     for axis, centre in zip("xyz", middle, strict=False):
         getattr(axes, f"set_{axis}lim")(centre - half, centre + half)
@@ -90,6 +97,15 @@ def _draw_way(axes: Any, scenario: Scenario, planar: bool) -> None:
     else:
         axes.set_box_aspect((1, 1, 1))
     axes.legend(loc="upper left")
+
+
+def _obstacles(scenario: Scenario) -> list[Obstacle]:
+    return [
+        obstacle
+        for constraint in scenario.constraints
+        if isinstance(constraint, CollisionConstraint)
+        for obstacle in constraint.obstacles
+    ]
 
 
 def stick(robot: Robot, q: Array) -> Array:

@@ -26,6 +26,7 @@ from dikbench.tasks import PostureTask
 from formulations.pseudo_inverse import PseudoInverse
 from scenarios import SCENARIOS
 from scenarios.joint_limit_crossing import CROSSINGS
+from scenarios.obstacle import SWINGS
 from scenarios.singular_postures import SINGULAR_POSTURES
 
 # What a robot needs beside its name, and variants that are cases of their own.
@@ -37,6 +38,11 @@ EXTRA = {
     ("near-miss", "ur5"): ["", "miss=0", "miss=0.005", "miss=0.2,speed=0.1"],
     ("joint-limit-crossing", "panda"): ["", "acceleration=true"],
     ("speed-sweep", "panda"): ["speed=0.3", "speed=1.3", "speed=2"],
+    ("obstacle", "panda"): [
+        f"where={where},shape={shape}" for where in SWINGS for shape in ("sphere", "capsule", "box")
+    ],
+    ("obstacle", "xarm7"): ["", "where=elbow"],
+    ("obstacle", "lwr"): ["where=elbow"],
 }
 SEEDS = (1, 2, 3, 4, 5)
 

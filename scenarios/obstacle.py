@@ -1,0 +1,305 @@
+"""An obstacle that the joint motion of a path runs into, by its hand or by its elbow."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.array import Array
+from dikbench.certificate import Certificate, Claim
+from dikbench.constraints import CollisionConstraint
+from dikbench.errors import DikbenchError
+from dikbench.kinematics import Kinematics
+from dikbench.linear_algebra import null_space
+from dikbench.obstacles import BoxObstacle, CapsuleObstacle, Obstacle, SphereObstacle
+from dikbench.oracle import measure_motion, oracle_motion, solve_placement
+from dikbench.references import Reference, joint_path
+from dikbench.robot import Robot
+from dikbench.robot_catalogue import load_robot
+from dikbench.scenario import Scenario
+from dikbench.tasks import PoseTask
+from dikbench.variation import Variation
+from scenarios.common import (
+    between,
+    duration_at,
+    influence_distance,
+    limits_in_force,
+    positive,
+    samples,
+    secondary_tasks,
+    start_velocity,
+)
+
+Where = Literal["hand", "elbow"]
+Shape = Literal["sphere", "capsule", "box"]
+
+
+@dataclass(frozen=True)
+class Swing:
+    """How a robot swings past an obstacle.
+
+    Attributes:
+        joint: that swings (index into v).
+        amplitude: to either side of the middle [rad].
+        middle: posture half way [rad]; None: the robot's start.
+    """
+
+    joint: int
+    amplitude: float
+    middle: tuple[float, ...] | None = None
+
+
+SWINGS: Mapping[Where, Mapping[str, Swing]] = MappingProxyType(
+    {
+        "hand": {robot: Swing(0, 0.6) for robot in ("panda", "ur3", "ur5", "ur10", "xarm7")},
+        # The shoulder's, in the plane of the arm; its null space turns the elbow out of it.
+        "elbow": {
+            "panda": Swing(1, 0.8),
+            "xarm7": Swing(1, 0.75),
+            "lwr": Swing(1, 0.6, (0.0, 0.95, 0.0, 1.2, 0.0, 0.9, 0.0)),
+        },
+    }
+)
+
+ELBOW = 4
+"""The joint at the elbow (Pinocchio's index) of the three arms of seven joints."""
+
+RADIUS = 0.05
+"""Of the obstacle, half the edge of a box [m]."""
+
+POLE = 0.3
+"""Length of the capsule's segment [m]."""
+
+MARGIN = 0.01
+"""Distance to keep [m]."""
+
+VARIATION = Variation(start=0.03, timing=0.1)
+
+
+def obstacle(
+    robot: Literal["panda", "ur3", "ur5", "ur10", "xarm7", "lwr"] = "panda",
+    *,
+    where: Literal["hand", "elbow"] = "hand",
+    shape: Literal["sphere", "capsule", "box"] = "sphere",
+    depth: float = 0.03,
+    speed: float = 0.3,
+    gain: float = 5.0,
+    dt: float = 0.01,
+    acceleration: bool = False,
+    seed: int = 0,
+) -> Scenario:
+    """A path whose own joint motion runs into an obstacle: the hand gives way, or the elbow does.
+
+    One joint swings past the middle posture and the task frame is asked to follow,
+
+        q(t) = q_m + (2 s - 1) a e_j,   s = u^3 (10 - 15 u + 6 u^2),   u = t/T.
+
+    In the way of the hand: the base swings, and the obstacle is in front of the hand half way, so
+    near that the hand is `depth` inside it: whoever keeps clear leaves the path and comes back. In
+    the way of the elbow (panda, xarm7, lwr): the shoulder swings in the plane of the arm and the
+    obstacle is beside the elbow, in the direction in which the null space moves it; a motion that
+    does the whole task and stays clear exists, and is measured. A sphere or capsule has the radius
+    0.05 m, a cube edges of 0.1 m; a capsule points at the robot. The margin is 0.01 m, from
+    capsules around the links (see `dikbench.collision_bodies`). A seed moves the middle posture by
+    up to 0.03 rad per joint and changes the duration by up to 10 %.
+
+    Provokes: links that run into what stands in their way
+
+    Shows in: distance_min_m, distance_violation_max_m, position_error_max_m
+
+    Args:
+        robot: one of those above; lwr for the elbow only, ur3, ur5 and ur10 for the hand only.
+        where: what the obstacle is in the way of, hand or elbow.
+        shape: sphere, capsule or box.
+        depth: how far inside the obstacle the reference's motion goes [m], 0.01 to 0.05.
+        speed: peak of the motion's joint speeds over their limits, 0.05 to 0.9.
+        gain: of the tracking task, 1/s.
+        dt: control period [s].
+        acceleration: whether acceleration limits are in force.
+        seed: 0 perturbs nothing.
+
+    Source: Faverjon & Tournassoud 1987 (obstacles near a manipulator); Maciejewski & Klein 1985
+    (the null space of a redundant arm keeps it clear).
+    """
+    positive("obstacle", gain=gain, dt=dt)
+    between("obstacle", "depth", depth, 0.01, 0.05)
+    between("obstacle", "speed", speed, 0.05, 0.9)
+    if robot not in SWINGS[where]:
+        raise DikbenchError(
+            f"scenario obstacle: robot={robot} with where={where}; valid: "
+            + ", ".join(SWINGS[where])
+        )
+    arm = limits_in_force(load_robot(robot), acceleration=acceleration)
+    swing, change = SWINGS[where][robot], VARIATION.drawn(seed)
+    middle = change.posture(arm, arm.q0 if swing.middle is None else np.array(swing.middle))
+    q0, at_one_second = _swing(arm, middle, swing, 1.0)
+    duration = duration_at(arm, at_one_second, q0, speed) * change.pace
+    _, reference = _swing(arm, middle, swing, duration)
+    motion = oracle_motion(arm, reference, q0, samples(duration, dt, most=100))
+    half_way = motion.q[len(motion.q) // 2]
+    influence = influence_distance(acceleration=acceleration)
+    constraint = replace(
+        _in_the_way(arm, half_way, swing.joint, where, shape, depth), influence=influence
+    )
+    distance = constraint.distances(arm, motion.q)
+    claims = [
+        Claim("least distance of the reference's motion [m]", distance.min(), -0.1, -0.8 * depth),
+        Claim("distance at the start [m]", distance[0], at_least=1.5 * MARGIN),
+        Claim("distance at the end [m]", distance[-1], at_least=1.5 * MARGIN),
+        Claim("smallest singular value (m, rad)", motion.sigma_min.min(), at_least=0.04),
+        Claim("position margin [rad]", motion.margin.min(), at_least=0.1),
+        Claim("required speed over limit", motion.peak_speed_ratio, 0.8 * speed, 1.2 * speed),
+    ]
+    if where == "hand":
+        carried = _distance_of_hand(arm, half_way, constraint)
+        claims.append(Claim("distance of the hand on its path [m]", carried, -0.1, -0.8 * depth))
+    else:
+        q = _clear_motion(arm, reference, motion.instants, q0, constraint)
+        other, clear = measure_motion(arm, motion.instants, q), constraint.distances(arm, q)
+        claims += [
+            Claim("least distance of another motion that does it [m]", clear.min(), MARGIN),
+            Claim("position margin of that motion [rad]", other.margin.min(), at_least=0.05),
+            Claim("required speed of that motion over limit", other.peak_speed_ratio, at_most=1.0),
+        ]
+    return Scenario(
+        robot=arm,
+        q0=q0,
+        v0=start_velocity(arm, reference, q0),
+        reference=reference,
+        tracking=PoseTask(gain=gain),
+        dt=dt,
+        duration=duration,
+        certificate=Certificate(tuple(claims)),
+        tasks=secondary_tasks(arm, q0),
+        motion=motion,
+        variation=VARIATION,
+        constraints=(constraint,),
+    )
+
+
+def _swing(arm: Robot, middle: Array, swing: Swing, duration: float) -> tuple[Array, Reference]:
+    """The start (nq,) and the path of the task frame as the joint swings past the middle."""
+    way = np.zeros(arm.nv)
+    way[swing.joint] = swing.amplitude
+
+    def q_r(tau: float) -> Array:
+        u = tau / duration
+        s = u**3 * (10 - 15 * u + 6 * u**2)
+        q: Array = pin.integrate(arm.model, middle, (2 * s - 1) * way)
+        return q
+
+    def v_r(tau: float) -> Array:
+        u = tau / duration
+        v: Array = 60 * u**2 * (1 - u) ** 2 / duration * way
+        return v
+
+    return q_r(0.0), joint_path(arm, q_r, v_r, duration)
+
+
+def _in_the_way(
+    arm: Robot, q: Array, joint: int, where: Where, shape: Shape, depth: float
+) -> CollisionConstraint:
+    """The obstacle that the motion runs into at q, `depth` inside, and the constraint about it."""
+    kinematics = Kinematics(arm)
+    kinematics.update(q)
+    J = kinematics.spatial_jacobian
+    if where == "hand":
+        X = kinematics.placement(arm.frame_id)
+        point, away = X.translation.copy(), X.rotation[:, 2].copy()
+    else:
+        _, point, away = _elbow_turn(arm, q)
+    along = _velocity(J[:, joint], point)
+    away /= np.linalg.norm(away)
+    along -= along @ away * away
+    along /= np.linalg.norm(along)
+    make = _SHAPES[shape]
+
+    def constraint(offset: float) -> CollisionConstraint:
+        solid = make(point + offset * away, np.column_stack([along, np.cross(away, along), away]))
+        return CollisionConstraint((solid,), self_collision=False, margin=MARGIN)
+
+    near, far = 0.0, 0.6
+    while far - near > 1e-9:
+        half = (near + far) / 2
+        inside = constraint(half).distances(arm, q[None])[0] < -depth
+        near, far = (half, far) if inside else (near, half)
+    return constraint(far)
+
+
+def _elbow_turn(arm: Robot, q: Array) -> tuple[Array, Array, Array]:
+    """The null space's direction (nv,) in which the elbow goes to the right, elbow, its velocity.
+
+    Elbow (3,) [m] and velocity (3,) in the world, whose x axis looks ahead.
+    """
+    kinematics = Kinematics(arm)
+    kinematics.update(q)
+    pin.forwardKinematics(arm.model, arm.scratch, q)
+    elbow = arm.scratch.oMi[ELBOW].translation.copy()
+    z = null_space(kinematics.jacobian(arm.frame_id), 1e-6)[:, 0]
+    before = slice(0, ELBOW - 1)  # the joints that move it
+    velocity = _velocity(kinematics.spatial_jacobian[:, before] @ z[before], elbow)
+    sign = -np.sign(velocity[1])
+    return sign * z, elbow, sign * velocity
+
+
+def _velocity(twist: Array, point: Array) -> Array:
+    """Of a point (3,) that moves with a twist (linear; angular) given at the world's origin."""
+    velocity: Array = twist[:3] + np.cross(twist[3:], point)
+    return velocity
+
+
+def _distance_of_hand(arm: Robot, q: Array, constraint: CollisionConstraint) -> float:
+    """The least distance [m] of what the task frame's joint carries, wherever the others are."""
+    kinematics, pairs = Kinematics(arm), constraint.pairs(arm)
+    kinematics.update(q)
+    joint = arm.model.frames[arm.frame_id].parentJoint
+    carried = np.array([joint in joints for joints in pairs.joints])
+    return float(pairs.distances(kinematics)[carried].min())
+
+
+def _clear_motion(
+    arm: Robot, reference: Reference, instants: Array, q0: Array, constraint: CollisionConstraint
+) -> Array:
+    """Configurations (k + 1, nq) that follow the reference exactly and keep clear, where some do.
+
+    The elbow turns away by as little as it takes, in steps of 0.1, and comes back: the way in the
+    null space goes as sin^2(pi t/T).
+    """
+    for turn in 0.1 * np.arange(1, 13):
+        q = _turned(arm, reference, instants, q0, turn)
+        if constraint.distances(arm, q).min() >= constraint.margin:
+            break
+    return q
+
+
+def _turned(arm: Robot, reference: Reference, instants: Array, q0: Array, turn: float) -> Array:
+    motion = [q0]
+    turned = turn * np.sin(np.pi * instants / instants[-1]) ** 2
+    for tau, step in zip(instants[1:], np.diff(turned), strict=True):
+        z, _, _ = _elbow_turn(arm, motion[-1])
+        q = pin.integrate(arm.model, motion[-1], -step * z)
+        motion.append(solve_placement(arm, reference.placement(tau), q))
+    return np.array(motion)
+
+
+def _sphere(centre: Array, axes: Array) -> Obstacle:
+    del axes
+    return SphereObstacle(tuple(centre), RADIUS)
+
+
+def _capsule(centre: Array, axes: Array) -> Obstacle:
+    return CapsuleObstacle(tuple(centre), tuple(centre + POLE * axes[:, 2]), RADIUS)
+
+
+def _box(centre: Array, axes: Array) -> Obstacle:
+    return BoxObstacle(tuple(centre), (2 * RADIUS,) * 3, tuple(map(tuple, axes)))
+
+
+_SHAPES: Mapping[Shape, Callable[[Array, Array], Obstacle]] = MappingProxyType(
+    {"sphere": _sphere, "capsule": _capsule, "box": _box}
+)

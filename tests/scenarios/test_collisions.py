@@ -1,0 +1,228 @@
+"""Obstacles and self-collision: who runs into them, who keeps clear, and by how much."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+
+from dikbench.array import Array
+from dikbench.constraints import CollisionConstraint
+from dikbench.errors import DikbenchError
+from dikbench.kinematics import Kinematics
+from dikbench.motion import recompute
+from dikbench.plants import Plant
+from dikbench.problem import program_of
+from dikbench.registry import make_formulation, make_scenario
+from dikbench.scenario import Scenario
+from dikbench.simulation import Run, simulate
+from dikbench.solvers.catalogue import parse_solver
+from dikbench.solvers.checked import make_solve
+from dikbench.solvers.warm.warm_solver import WORKSPACES
+from dikbench.status import STEP_CODE, Status
+
+CASES = [
+    "obstacle[robot=panda]",
+    "obstacle[robot=ur5,shape=capsule]",
+    "obstacle[robot=panda,where=elbow,speed=0.6]",
+    "obstacle[robot=lwr,where=elbow,shape=box,speed=0.6]",
+    "self-collision[robot=panda,speed=0.6]",
+    "self-collision[robot=ur5,speed=0.6]",
+]
+
+EXACT = 1e-8
+"""How far daqp may be from a row [m]."""
+
+
+def _run(law: str, scenario: Scenario, solver: str = "daqp") -> Run:
+    formulation = make_formulation(law)
+    program = program_of(formulation)
+    solve = make_solve(None if program is None else parse_solver(solver), program)
+    run = simulate(scenario, formulation, solve, Plant())
+    assert run.status is Status.OK
+    return run
+
+
+def _constraint(scenario: Scenario) -> CollisionConstraint:
+    (constraint,) = scenario.constraints
+    assert isinstance(constraint, CollisionConstraint)
+    return constraint
+
+
+def _errors(run: Run, scenario: Scenario) -> Array:
+    return recompute(run.trace, scenario).position_error
+
+
+@pytest.mark.parametrize("selector", CASES)
+def test_a_law_that_does_not_look_runs_into_it(selector: str) -> None:
+    """`dls` follows the path within millimetres, centimetres deep in what stands in its way."""
+    scenario = make_scenario(selector)
+    run = _run("dls", scenario)
+    distance = _constraint(scenario).distances(scenario.robot, run.trace.q)
+    assert distance.min() < -0.02
+    assert _errors(run, scenario).max() < 5e-3
+
+
+@pytest.mark.parametrize("law", ["qp", "hqp", "lp-alpha"])
+@pytest.mark.parametrize("selector", CASES)
+def test_distances_fall_below_the_margin_by_the_remainder_and_no_more(
+    selector: str, law: str
+) -> None:
+    """What is left out of the linearisation of a step is all that is missing of the margin."""
+    scenario = make_scenario(selector)
+    constraint, run = _constraint(scenario), _run(law, scenario)
+    distance = constraint.distances(scenario.robot, run.trace.q)
+    remainder = float(constraint.remainders(scenario.robot, run.trace.q).min())
+    missing = constraint.margin - float(distance.min())
+    print(f"{law} {selector}: {missing:.1e} m below the margin, remainder {remainder:.1e} m")
+    assert missing <= -remainder + EXACT
+    assert missing < 2e-4
+    assert missing > -0.005  # it was needed
+    infeasible = run.trace.status == STEP_CODE[Status.INFEASIBLE]
+    assert not infeasible.any()
+
+
+@pytest.mark.parametrize("law", ["qp", "hqp", "lp-alpha"])
+def test_the_null_space_keeps_an_elbow_clear(law: str) -> None:
+    """The hand stays on its path all the while."""
+    scenario = make_scenario("obstacle[robot=panda,where=elbow]")
+    assert _errors(_run(law, scenario), scenario).max() < 1e-3
+
+
+def test_a_hand_gives_way_and_comes_back_or_stops() -> None:
+    """`qp` goes round by what it takes; `lp-alpha`, which never leaves its course, gets stuck."""
+    scenario = make_scenario("obstacle[robot=ur5,depth=0.04]")
+    error = _errors(_run("qp", scenario), scenario)
+    assert error.max() > 0.04
+    assert error[-1] < 2e-3
+    stuck = _run("lp-alpha", scenario)
+    assert stuck.trace.share(Status.STUCK) > 0.3
+    assert _errors(stuck, scenario)[-1] > 0.1
+
+
+@pytest.mark.parametrize("where", ["hand", "elbow"])
+def test_what_is_in_the_way_is_in_the_way_of_the_hand_or_of_the_elbow(where: str) -> None:
+    """Half way the hand itself is `depth` inside, wherever the null space is; or far from it."""
+    scenario = make_scenario(f"obstacle[robot=xarm7,where={where}]")
+    claims = {claim.quantity: claim.value for claim in scenario.certificate.claims}
+    assert ("distance of the hand on its path [m]" in claims) == (where == "hand")
+    assert scenario.motion is not None
+    kinematics = Kinematics(scenario.robot)
+    kinematics.update(scenario.motion.q[len(scenario.motion.q) // 2])
+    pairs = _constraint(scenario).pairs(scenario.robot)
+    hand = pairs.names.index(("link7_0", "obstacle_0"))
+    distance = pairs.distances(kinematics)[hand]
+    if where == "hand":
+        assert distance == pytest.approx(-0.03, abs=1e-6)
+        assert claims["distance of the hand on its path [m]"] == distance
+    else:
+        assert distance > 0.1
+
+
+def test_braking_keeps_clear_with_little_acceleration() -> None:
+    """The UR5's 6.3 rad/s^2: the margin is kept as well, and every step has an answer."""
+    scenario = make_scenario("obstacle[robot=ur5,acceleration=true,speed=0.6]")
+    run, constraint = _run("qp", scenario), _constraint(scenario)
+    assert constraint.distances(scenario.robot, run.trace.q).min() > constraint.margin - 1e-4
+    assert run.trace.share(Status.INFEASIBLE) == 0
+    blind = replace(constraint, influence=0.011)
+    late = _run("qp", replace(scenario, constraints=(blind,)))
+    assert constraint.distances(scenario.robot, late.trace.q).min() < constraint.margin - 1e-3
+
+
+@pytest.mark.filterwarnings(r"ignore::UserWarning:qpsolvers\.")
+@pytest.mark.parametrize("name", [name for name in WORKSPACES if name != "highs"])
+def test_rows_that_come_and_go_do_not_break_a_workspace(
+    monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """Cold and warm make the motion of daqp, verified at every step, with one workspace throughout.
+
+    Rows are zeros with h = 1 while their pair is far, then anything, then zeros again.
+    """
+    scenario = make_scenario("obstacle[robot=panda,speed=0.6]")
+    expected = _run("qp", scenario).trace.q
+    module = importlib.import_module(f"dikbench.solvers.warm.{name}_workspace")
+    made, workspace = [], getattr(module, WORKSPACES[name])
+
+    def counted(*given: object) -> object:
+        made.append(given)
+        return workspace(*given)
+
+    monkeypatch.setattr(module, WORKSPACES[name], counted)
+    for interface in ("cold", "warm"):
+        run = _run("qp", scenario, f"{name}[interface={interface},preset=high]")
+        assert (run.trace.verified == 1).all()
+        off = np.abs(run.trace.q - expected).max()
+        print(f"{name} {interface}: {off:.1e} rad from daqp")
+        assert off < 1e-5
+    assert len(made) == 1
+
+
+def test_rows_come_and_go() -> None:
+    """On that scenario: at the start few rows say something, half way most, at the end few."""
+    scenario = make_scenario("obstacle[robot=panda,speed=0.6]")
+    constraint, run = _constraint(scenario), _run("qp", scenario)
+    pairs = constraint.pairs(scenario.robot)
+    assert len(pairs) <= constraint.rows
+    kinematics, active = Kinematics(scenario.robot), []
+    for q in run.trace.q:
+        kinematics.update(q)
+        G, _ = constraint.linearize(kinematics, None, scenario.dt)
+        active.append(int((np.abs(G).max(axis=1) > 0).sum()))
+    assert active[0] < 0.6 * max(active)
+    assert active[-1] < 0.6 * max(active)
+
+
+# --- what does not certify
+
+
+def test_an_obstacle_that_is_met_at_once_does_not_certify(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Blunted: a swing so short that it begins inside."""
+    module = sys.modules["scenarios.obstacle"]
+    short = {"hand": {"panda": replace(module.SWINGS["hand"]["panda"], amplitude=0.05)}}
+    monkeypatch.setattr(module, "SWINGS", short)
+    with pytest.raises(DikbenchError, match=r"distance at the start .* is false"):
+        make_scenario("obstacle")
+
+
+def test_an_elbow_that_cannot_turn_away_does_not_certify(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Blunted: the null space is not used, so that no motion is known that does the task."""
+    module = sys.modules["scenarios.obstacle"]
+    turned = module._turned
+    monkeypatch.setattr(module, "_turned", lambda *given: turned(*given[:-1], 0.0))
+    with pytest.raises(DikbenchError, match=r"another motion that does it .* is false"):
+        make_scenario("obstacle[where=elbow]")
+
+
+def test_an_arm_that_stays_unfolded_does_not_certify(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Blunted: half the way."""
+    module = sys.modules["scenarios.self_collision"]
+    half: Mapping[str, object] = MappingProxyType({"ur5": (0.0, 0.0, 0.6, 0.4, 0.0, 0.0)})
+    monkeypatch.setattr(module, "WAYS", half)
+    with pytest.raises(DikbenchError, match=r"least distance of the reference's motion .* is fal"):
+        make_scenario("self-collision[robot=ur5]")
+
+
+@pytest.mark.parametrize(
+    ("selector", "part"),
+    [
+        ("obstacle[robot=lwr]", "robot=lwr with where=hand; valid: panda, ur3, ur5, ur10, xarm7"),
+        ("obstacle[robot=ur5,where=elbow]", "valid: panda, xarm7, lwr"),
+        ("obstacle[depth=0.2]", "depth=0.2 must be between 0.01 and 0.05"),
+        ("obstacle[shape=cone]", "sphere, capsule, box"),
+        ("obstacle[speed=2]", "speed=2.0 must be between 0.05 and 0.9"),
+        ("self-collision[speed=0]", "speed=0.0 must be between 0.05 and 0.9"),
+        ("self-collision[robot=base]", "panda"),
+    ],
+)
+def test_what_cannot_be_is_one_line(selector: str, part: str) -> None:
+    """The parameter and its range."""
+    with pytest.raises(DikbenchError) as caught:
+        make_scenario(selector)
+    assert "\n" not in str(caught.value)
+    assert part in str(caught.value)
