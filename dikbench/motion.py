@@ -10,10 +10,12 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.array import Array
+from dikbench.constraints import CollisionConstraint, TorqueConstraint
 from dikbench.following import follow_path
 from dikbench.kinematics import Kinematics
 from dikbench.limits import Interval
 from dikbench.progress import progress, row_weights
+from dikbench.robot import Robot
 from dikbench.scenario import Scenario
 from dikbench.tasks import PostureTask
 from dikbench.trace import Trace
@@ -136,6 +138,53 @@ class Motion:
             errors = [task.linearize(kinematics).error for task in second]
             norms.append(float(np.linalg.norm(np.concatenate(errors))))
         return np.array(norms)
+
+    @cached_property
+    def distances(self) -> Array:
+        """Smallest distance that a collision constraint is about, (n + 1,) [m]; else empty."""
+        return self._least([c.distances(self._robot, self.trace.q) for c in self._collisions])
+
+    @cached_property
+    def clearance(self) -> Array:
+        """Smallest distance less the margin that its constraint keeps, (n + 1,) [m]; else empty."""
+        return self._least(
+            [c.distances(self._robot, self.trace.q) - c.margin for c in self._collisions]
+        )
+
+    @cached_property
+    def distance_remainders(self) -> Array:
+        """By how much distances fell below what the rows of each step predict, (n,) [m].
+
+        The largest over the pairs that had rows (see `CollisionConstraint.remainders`); else empty.
+        """
+        parts = [c.remainders(self._robot, self.trace.q) for c in self._collisions]
+        return 0.0 - self._least([part.min(axis=1, initial=0.0) for part in parts])
+
+    @cached_property
+    def torque_usage(self) -> Array:
+        """Largest joint torque over its limit in each step, (n,); empty where none is limited."""
+        robot, trace = self._robot, self.trace
+        limit = robot.limits.effort
+        for constraint in self.scenario.constraints:
+            if isinstance(constraint, TorqueConstraint) and limit is not None:
+                v = self.velocities
+                torques = constraint.torques(robot, trace.q[:-1], v[1:], v[:-1], trace.dt)
+                usage: Array = limit.usage(torques).max(axis=1, initial=0.0)
+                return usage
+        return np.empty(0)
+
+    @property
+    def _robot(self) -> Robot:
+        return self.scenario.robot
+
+    @property
+    def _collisions(self) -> list[CollisionConstraint]:
+        return [c for c in self.scenario.constraints if isinstance(c, CollisionConstraint)]
+
+    def _least(self, parts: list[Array]) -> Array:
+        """The smallest of arrays of one shape, element by element; empty where there is none."""
+        least: Array = np.min(parts, axis=0) if parts else np.empty(0)
+        return least
 
     @cached_property
     def sigma_min(self) -> float:

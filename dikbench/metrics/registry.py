@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from dikbench.metrics.constraints import CONSTRAINTS
 from dikbench.metrics.contour import CONTOUR
 from dikbench.metrics.metric import Metric
 from dikbench.metrics.null_space_drift import NULL_SPACE_DRIFT
@@ -24,6 +25,7 @@ METRICS: Mapping[str, Metric] = MappingProxyType(
             *CONTOUR,
             *NULL_SPACE_DRIFT,
             *VIOLATION,
+            *CONSTRAINTS,
             *SMOOTHNESS,
             *SOLVER,
         )
