@@ -39,7 +39,7 @@ def _along(points: Array, axis: Array) -> tuple[Array, Array, float]:
     off_axis = np.linalg.norm(flat - centre, axis=1)
     radius = float(off_axis.max())
     # A point may lie in the cap beyond the segment, as far as its distance from the axis allows.
-    cap = np.sqrt(radius**2 - off_axis**2)
+    cap = np.sqrt(np.maximum(radius**2 - off_axis**2, 0.0))
     low, high = float((height + cap).min()), float((height - cap).max())
     if low > high:  # one sphere about anything between does
         low = high = (low + high) / 2

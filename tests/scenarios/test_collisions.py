@@ -136,7 +136,7 @@ def test_braking_keeps_clear_with_little_acceleration() -> None:
 
 
 @pytest.mark.filterwarnings(r"ignore::UserWarning:qpsolvers\.")
-@pytest.mark.parametrize("name", [name for name in WORKSPACES if name != "highs"])
+@pytest.mark.parametrize("name", list(WORKSPACES))
 def test_rows_that_come_and_go_do_not_break_a_workspace(
     monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
