@@ -49,12 +49,12 @@ def draw_error_and_time(ran: pd.DataFrame, target: Path) -> list[Figure]:
     figure.legend(*axis.get_legend_handles_labels(), loc="outside upper center", ncols=4)
     colours = [COLOURS[1] if with_solver else COLOURS[0] for with_solver in solving]
     points = table[["time", "error"]].to_numpy()
-    label_points(axis, points, [short(str(law)) for law in table.index], colours)
+    nameless = label_points(axis, points, [short(str(law)) for law in table.index], colours)
     caption = (
         f"Median rms {name} against the median 99 % quantile of the time of one call, over the "
         f"scenarios that were timed, {how(rows)}, a point per law and solver. Best is the lower "
         "left corner. Laws that fail in half of them are left out. Compare ratios: absolute times "
-        "belong to the machine in the manifest."
+        f"belong to the machine in the manifest.{nameless}"
     )
     file = save(figure, target, "error_against_time_per_law")
     return [Figure(file, caption, f"{name[0].upper()}{name[1:]} against time of a call")]

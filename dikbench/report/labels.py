@@ -10,7 +10,7 @@ import numpy as np
 from dikbench.array import Array
 from dikbench.report.style import lay_out
 
-RADII: Final = (5.5, 9.0, 14.0, 20.0, 28.0, 38.0, 50.0)
+RADII: Final = (5.5, 9.0, 14.0, 20.0, 28.0, 38.0, 50.0, 66.0, 85.0)
 """Distances from the point at which room is looked for [pt], ..."""
 
 ANGLES: Final = (0, 180, 45, -45, 135, -135, 90, -90, 20, -20, 160, -160, 68, -68, 112, -112)
@@ -19,16 +19,19 @@ ANGLES: Final = (0, 180, 45, -45, 135, -135, 90, -90, 20, -20, 160, -160, 68, -6
 LEADER: Final = 8.0
 """From this distance on a line leads from the point to its name [pt]."""
 
+SAMPLES: Final = np.linspace(0.0, 1.0, 12)
+"""Places along such a line at which it is held against names and points."""
+
 
 def label_points(
     axis: Any, points: Array, names: Sequence[str], colours: Sequence[str], size: float = 6.5
-) -> list[str]:
+) -> str:
     """Write the names of points (k, 2) beside them, those in the thick of it first.
 
     Everything else in the figure must be there already: it is laid out.
 
     Returns:
-        The names for which there was no room; they are left out.
+        A sentence about the names for which there was no room, which are left out.
     """
     figure = axis.figure
     lay_out(figure)
@@ -55,8 +58,10 @@ def label_points(
         text.set_position(tuple(offset))
         middle = places[index] + offset
         taken.append(np.concatenate([middle - half, middle + half]))
-        nearest = np.clip(places[index], middle - half, middle + half) - places[index]
+        nearest = _leader(offset, half)
         if np.linalg.norm(nearest) > LEADER:
+            along = places[index] + SAMPLES[:, None] * nearest
+            taken.extend(np.concatenate([along, along], axis=1))  # no later name covers the line
             axis.annotate(
                 "", points[index], xytext=tuple(nearest), textcoords="offset points",
                 in_layout=False, zorder=2,
@@ -64,7 +69,12 @@ def label_points(
                     "arrowstyle": "-", "color": "0.6", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2
                 },
             )  # fmt: skip
-    return left_out
+    return f" There was no room for the names of {', '.join(left_out)}." if left_out else ""
+
+
+def _leader(offset: Array, half: Array) -> Array:
+    """From a point to the nearest place of a name, whose middle is at an offset from the point."""
+    return np.clip(np.zeros(2), offset - half, offset + half)
 
 
 def _room(place: Array, half: Array, taken: Sequence[Array], frame: Array) -> Array | None:
@@ -77,6 +87,12 @@ def _room(place: Array, half: Array, taken: Sequence[Array], frame: Array) -> Ar
             low, high = place + offset - half, place + offset + half
             inside = np.all(low >= frame[:2]) and np.all(high <= frame[2:])
             hits = np.all((low < boxes[:, 2:]) & (high > boxes[:, :2]), axis=1)
-            if inside and not hits.any():
-                return offset
+            if not inside or hits.any():
+                continue
+            leader = _leader(offset, half)
+            if np.linalg.norm(leader) > LEADER:
+                line = place + SAMPLES[2:-1, None, None] * leader  # past the point itself
+                if np.any(np.all((line > boxes[:, :2]) & (line < boxes[:, 2:]), axis=2)):
+                    continue
+            return offset
     return None

@@ -30,16 +30,19 @@ def draw_off_course_and_slow_down(ran: pd.DataFrame, target: Path) -> list[Figur
     axes[-1, 0].set_xlabel("mean slow-down [%]")
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=3)
+    nameless = ""
     for axis, table in zip(axes.flat, tables.values(), strict=True):
         colours = [COLOURS[1] if violating else COLOURS[0] for violating in table["violating"]]
         names = [short(str(name)) for name in table.index]
-        label_points(axis, table[["slow_down", "off_course"]].to_numpy(), names, colours)
+        nameless += label_points(
+            axis, table[["slow_down", "off_course"]].to_numpy(), names, colours
+        )
     caption = (
         "Largest angle off the wanted direction against the share of the wanted motion that was "
         "not made, means over the scenarios, a point per law (first of its solvers); a failed "
         "trial counts as 180 deg and 100 %. Best is the lower left corner. The line joins the laws "
         "that keep the limits in every trial and that no other such law beats in both; a law that "
-        "passes a limit is hollow."
+        f"passes a limit is hollow.{nameless}"
     )
     file = save(figure, target, "off_course_against_slow_down")
     return [Figure(file, caption, "Off course against slow-down")]

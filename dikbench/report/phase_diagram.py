@@ -146,7 +146,7 @@ def _draw(grid: NearMissGrid, laws: Sequence[str], one: _Map, target: Path, file
         laws,
         0.2 * max(rows, 3),
         "miss distance [m; rad]",
-        "speed past the singularity [rad/s; m/s]",
+        "speed [rad/s; m/s]",
         top=0.68 if one.bar else 0.5,
     )
     outcome = grid.values("outcome", "max")

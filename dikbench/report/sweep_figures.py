@@ -106,10 +106,11 @@ def _draw(sweep: Sweep, quantity: _Quantity, laws: Sequence[str], target: Path, 
                 color=colour, markersize=2.5, linewidth=1.1, label=short(second),
             )  # fmt: skip
             failed = scale.place(curve.index[curve["failed"]])
-            axis.plot(
-                failed, np.full(len(failed), 0.97), "x", color=colour, markersize=3,
-                transform=axis.get_xaxis_transform(),
-            )  # fmt: skip
+            if len(failed):
+                axis.plot(
+                    failed, np.full(len(failed), 0.97), "x", color=colour, markersize=3,
+                    transform=axis.get_xaxis_transform(),
+                )  # fmt: skip
         if quantity.name == "peak_speed":
             axis.axhline(1.0, color="0.4", linewidth=0.7, zorder=1)
     logarithmic(axes[0], "y")  # they share their axes

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from hypothesis import given
@@ -112,23 +113,29 @@ def test_bars_are_the_parts_of_a_step(
         np.testing.assert_allclose(starts, np.cumsum([0.0, *widths[:-1]]))
 
 
-def test_names_cover_neither_points_nor_names() -> None:
-    """Forty crowded points: every name that is written has its place to itself."""
-    random = np.random.default_rng(1)
+def test_names_cover_neither_points_nor_names_nor_lines() -> None:
+    """Forty crowded points: every name has its place to itself, or the caption names it."""
+    points = np.random.default_rng(1).normal(size=(40, 2))
+    names = [f"name-{number:02}" for number in range(40)]
     with style():
-        import matplotlib.pyplot as plt
-
         figure, axis = plt.subplots(figsize=(6, 4))
-        points = random.normal(size=(40, 2))
         axis.plot(*points.T, "o")
-        names = [f"name-{number}" for number in range(40)]
-        left_out = label_points(axis, points, names, ["black"] * 40)
+        sentence = label_points(axis, points, names, ["black"] * 40)
         texts = [text for text in axis.texts if text.get_text()]
-        boxes = [text.get_window_extent() for text in texts if text.get_text()]
+        boxes = [text.get_window_extent() for text in texts]
+        places = axis.transData.transform(points)
+        pixel = figure.dpi / 72.0
+        lines = [
+            axis.transData.transform(text.xy) + share * pixel * np.array(text.get_position())
+            for text in axis.texts
+            if not text.get_text()
+            for share in (0.5, 0.7, 0.9)
+        ]
         plt.close(figure)
-    assert len(texts) + len(left_out) == 40
+    left_out = {name for name in names if name in sentence}
+    assert {text.get_text() for text in texts} == set(names) - left_out
     assert len(left_out) < 10
     for number, box in enumerate(boxes):
         shrunk = box.padded(-1.0)
         assert not any(shrunk.overlaps(other) for other in boxes[:number])
-        assert not any(shrunk.contains(*place) for place in axis.transData.transform(points))
+        assert not any(shrunk.contains(*place) for place in (*places, *lines))
