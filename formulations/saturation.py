@@ -18,30 +18,47 @@ FREEDOM = 1e-6
 rounding grows by the inverse of the square, and what is above must stay below 1e-9."""
 
 ROUNDING = 1e-10
-"""A multiplier [rad/s] whose sign is not to be trusted."""
+"""A multiplier [rad/s, or of the scale 1/(rad/s)] whose sign is not to be trusted."""
 
 NEGLIGIBLE = 1e-100
 """A speed [rad/s] that is none: quotients by it stay finite."""
 
 
-class _Held(NamedTuple):
-    """The motion that saturated joints leave.
+class _Motion(NamedTuple):
+    """The motion v = s a + b that saturated joints leave to a level, by the scale s of its task.
 
     Attributes:
-        base: the least motion from the start that has them at their bounds, (nv,).
-        free: projector onto the motions that move none of them, (nv, nv).
-        effect: change of `base` per unit of each bound, (nv, number of saturated joints).
+        a, b: (nv,).
+        free: projector onto the motions that move none of the saturated joints, (nv, nv).
+        effect: change of the least motion that has them at their bounds, without the task, per unit
+            of each bound, (nv, number of saturated joints).
+        J: the task's Jacobian, (m, nv).
+        inverse: of what is free of it, (nv, m).
+        rank: of what is free of it.
     """
 
-    base: Array
+    a: Array
+    b: Array
     free: Array
     effect: Array
+    J: Array
+    inverse: Array
+    rank: int
+
+    @property
+    def slope(self) -> Array:
+        """Change of b per unit of each bound, (nv, number of saturated joints)."""
+        slope: Array = self.effect - self.inverse @ (self.J @ self.effect)
+        return slope
 
 
 def saturated_levels(
     problem: DikProblem, box: Box, rank_tolerance: float, *, optimal: bool
 ) -> Array:
     """Every priority level in turn, each in the null space of those above, inside the box.
+
+    Where the box excludes rest, as under acceleration limits in motion, the least velocity may have
+    so many joints outside it that no saturation helps: then the least change of velocity.
 
     Raises:
         Infeasible: if no scale of the first task was found for which the box holds.
@@ -50,6 +67,9 @@ def saturated_levels(
     levels = problem.levels
     for number, level in enumerate(levels):
         found = _saturated(level, v, N, box, rank_tolerance, optimal=optimal)
+        if found is None and number == 0:
+            before = v if problem.v_prev is None else problem.v_prev
+            found = _saturated(level, _inside(before, box), N, box, rank_tolerance, optimal=optimal)
         if found is not None:
             v = found
         elif number == 0:
@@ -65,35 +85,71 @@ def _saturated(
 ) -> Array | None:
     """The velocity of one level from `start` in the range of the projector N; None: none found."""
     bounds: dict[int, float] = {}  # of the saturated joints
-    rank = None
-    best, best_scale = None, -1.0
-    for _ in range(2 * len(start) + 1):  # freeing joints may go round in circles
-        held = _hold(bounds, start, N)
-        if held is None:
-            break
-        inverse, rows = inverse_and_row_space(level.J @ held.free, tolerance)
-        rank = len(rows) if rank is None else rank
-        if len(rows) < rank:
-            break
-        a = inverse @ level.V
-        b = held.base - inverse @ (level.J @ held.base)
+    best, best_scale, vain, rank = None, -1.0, None, 0
+    for _ in range(4 * len(start)):  # letting go of joints may go round in circles
+        motion = _motion(level, bounds, start, N, tolerance, rank)
+        if motion is None:  # one joint too many
+            if vain is None:
+                break
+            del bounds[vain]
+            vain = None
+            continue
+        rank = motion.rank
+        a, b = motion.a, motion.b
         scale, critical = _scale(a, b, box, bounds)
         if scale > best_scale:
             best, best_scale = _inside(b + scale * a, box), scale
-        if optimal and scale >= 0:
-            moved = b + scale * a - start  # by this level, which makes it as small as it can
-            wrong = _wrong_side(moved, held.effect, inverse @ level.J, box, bounds)
-            for joint in wrong:
-                del bounds[joint]
-            if wrong:
-                continue
+        vain = None
         if critical is None:
-            return _inside(a + b, box)
-        if held.free[critical, critical] <= FREEDOM:
-            break
+            done = _inside(a + b, box)
+            return _least(level, bounds, done, start, N, box, tolerance, rank) if optimal else done
+        if optimal and scale >= 0:
+            wrong = _in_vain(-motion.slope[critical] / a[critical], box, bounds)
+            vain = max(wrong, key=wrong.__getitem__, default=None)
+        if motion.free[critical, critical] <= FREEDOM:
+            if vain is None:
+                break
+            del bounds[vain]
+            vain = None
         outwards = a[critical] + b[critical] > box.upper[critical]
         bounds[critical] = float((box.upper if outwards else box.lower)[critical])
     return best
+
+
+def _least(
+    level: LinearizedTask,
+    bounds: dict[int, float],
+    v: Array,
+    start: Array,
+    N: Array,
+    box: Box,
+    tolerance: float,
+    rank: int,
+) -> Array:
+    """From a velocity that does the task, with joints saturated, to the one nearest to `start`.
+
+    Min ||v - start||^2 s.t. the task and the box, by a primal active set.
+    """
+    for _ in range(4 * len(v)):
+        motion = _motion(level, bounds, start, N, tolerance, rank)
+        if motion is None:
+            break
+        way = motion.a + motion.b - v
+        room = np.full(len(v), np.inf)
+        np.divide(
+            np.where(way > 0, box.upper, box.lower) - v, way, out=room, where=abs(way) > NEGLIGIBLE
+        )
+        room[list(bounds)] = np.inf
+        blocked = int(np.argmin(room))
+        v = _inside(v + min(1.0, float(room[blocked])) * way, box)
+        if room[blocked] < 1:
+            bounds[blocked] = float((box.upper if way[blocked] > 0 else box.lower)[blocked])
+            continue
+        wrong = _in_vain(-motion.slope.T @ (v - start), box, bounds)
+        if not wrong:
+            break
+        del bounds[max(wrong, key=wrong.__getitem__)]
+    return v
 
 
 def _inside(v: Array, box: Box) -> Array:
@@ -102,18 +158,30 @@ def _inside(v: Array, box: Box) -> Array:
     return held
 
 
-def _hold(bounds: dict[int, float], start: Array, N: Array) -> _Held | None:
-    """Saturate joints, by least motion in the range of N; None where that leaves no way to."""
-    if not bounds:
-        return _Held(start, N, np.empty((len(start), 0)))
-    joints = list(bounds)
-    rows = N[joints]
-    solved = solve_positive_definite(rows[:, joints], rows)
-    if solved is None:
+def _motion(
+    level: LinearizedTask,
+    bounds: dict[int, float],
+    start: Array,
+    N: Array,
+    tolerance: float,
+    rank: int,
+) -> _Motion | None:
+    """The least motion in the range of N, with joints saturated; None where that costs rank."""
+    base, free, effect = start, N, np.empty((len(start), 0))
+    if bounds:
+        joints = list(bounds)
+        rows = N[joints]
+        solved = solve_positive_definite(rows[:, joints], rows)
+        if solved is None:
+            return None
+        effect = solved.T
+        base = start + effect @ (np.array([*bounds.values()]) - start[joints])
+        free = N - effect @ rows
+    inverse, row_space = inverse_and_row_space(level.J @ free, tolerance)
+    if len(row_space) < rank:
         return None
-    effect = solved.T
-    gap = np.array([*bounds.values()]) - start[joints]
-    return _Held(start + effect @ gap, N - effect @ rows, effect)
+    b = base - inverse @ (level.J @ base)
+    return _Motion(inverse @ level.V, b, free, effect, level.J, inverse, len(row_space))
 
 
 def _scale(a: Array, b: Array, box: Box, bounds: dict[int, float]) -> tuple[float, int | None]:
@@ -139,17 +207,17 @@ def _scale(a: Array, b: Array, box: Box, bounds: dict[int, float]) -> tuple[floa
     return scale, int(np.argmin(np.where(outside, high, np.inf)))
 
 
-def _wrong_side(
-    v: Array, effect: Array, done: Array, box: Box, bounds: dict[int, float]
-) -> list[int]:
-    """The saturated joints whose coming off the bound would make the motion smaller.
+def _in_vain(gain: Array, box: Box, bounds: dict[int, float]) -> dict[int, float]:
+    """The saturated joints that had better come off their bounds, and how much that gains.
 
-    The multipliers of the bounds in min 1/2 ||v||^2: the derivative of ||v||^2/2 by each bound.
+    Args:
+        gain: what is gained per unit of each bound, (number of saturated joints,).
+        box: the velocity box.
+        bounds: of the saturated joints.
     """
-    slope = (effect - done @ effect).T @ v
-    return [
-        joint
-        for joint, rate in zip(bounds, slope, strict=True)
-        if (bounds[joint] < box.upper[joint] and rate < -ROUNDING)
-        or (bounds[joint] > box.lower[joint] and rate > ROUNDING)
-    ]
+    return {
+        joint: abs(rate)
+        for joint, rate in zip(bounds, gain.tolist(), strict=True)
+        if (bounds[joint] > box.lower[joint] and rate < -ROUNDING)
+        or (bounds[joint] < box.upper[joint] and rate > ROUNDING)
+    }

@@ -18,23 +18,25 @@ from formulations.saturation import saturated_levels
 class OptimalSaturationInNullSpace:
     """Optimal saturation in the null space: `sns` that lets go of joints held in vain.
 
-    As `sns`, but whenever a scale s fits, the joints that are held at a bound although the motion
-    would be smaller without are let go, by the sign of their multiplier in
+    As `sns`, but where one more joint cannot be held, that joint changes places with a held one if
+    the scale grows by it, ds/d(bound_j) > 0 on the way off the bound: a pivot of the simplex method
+    on max s. And where s = 1 fits, joints come off their bounds, by the sign of their multiplier,
+    until the velocity is the least one that does the task:
 
-        min_v 1/2 ||v||^2   s.t.   J v = s V,   lo <= v <= hi,
+        min_v 1/2 ||v||^2   s.t.   J v = V,   lo <= v <= hi,
         mu = T^T v,   T_j = dv/d(bound_j),   mu_j <= 0 at hi,   mu_j >= 0 at lo
 
-    Where s = 1 fits, the velocity is the least one that does the task. The multipliers are those
-    of the norm, not of s: where the task has to be scaled it comes nearer to the largest s than
-    `sns` in some states and less near in others. J (m, nv) and V (m,) are each priority level's,
-    poses in the task frame; v in rad/s. Strict priority, bounds active or not; `Infeasible` where
-    no s fits. Weights play no part.
+    (from the second start of `sns`: the least change of velocity). Reaches the s of the linear
+    program but in one of hundreds of states, without a solver. J (m, nv) and V (m,) are each
+    priority level's, poses in the task frame; v in rad/s. Strict priority, bounds active or not;
+    `Infeasible` where no s fits. Weights play no part.
 
     Attributes:
         braking: how the box approaches a position limit (see `dikbench.box`).
         rank_tolerance: singular values of J W up to this count as zero (absolute, units of J).
 
-    Source: [Flacco2015].
+    Source: [Flacco2015], whose multipliers are those of the norm alone, which let go of joints that
+    the scale needs.
     """
 
     braking: Braking = "viable"

@@ -115,7 +115,7 @@ def test_with_redundancy_they_part(count: int) -> None:
     """Panda, three times the twist of a joint velocity drawn inside the limits.
 
     Means of s: scaled pseudo-inverse 0.403, saturation 0.438, linear program 0.439 (over 5000
-    states 0.408, 0.440, 0.441; saturation is at the program's in 96 % of them).
+    states 0.408, 0.440, 0.441; `sns` is at the program's in 96 % of them).
     """
     problems = arm_states("panda", count, lambda v, _: 3 * v)
     scaled, basic, optimal, lp = scales(problems, "pinv[after=scale]", *SNS, LP)
@@ -129,6 +129,7 @@ def test_with_redundancy_they_part(count: int) -> None:
     for reached in (basic, optimal):
         assert np.all(reached >= scaled - 1e-9)
         assert np.all(reached <= lp + SAME)
+    assert np.mean(optimal > lp - SAME) > 0.99
 
 
 @pytest.mark.parametrize("count", COUNTS)
@@ -177,10 +178,11 @@ def test_share_that_reaches_the_true_scale(m: int, n: int, symmetric: bool, coun
     | law, (m, n) | symmetric | asymmetric |
     |---|---|---|
     | pinv[after=scale], (6, 7) | 10.3 %, 1.4 %, .123, .71 | 12.1 %, 1.4 %, .117, .77 |
-    | sns, sns-optimal, (6, 7) | 87.9 %, 85.0 %, .0068, .49 | 91.2 %, 88.3 %, .0048, .49 |
+    | sns, (6, 7) | 87.9 %, 85.0 %, .0068, .49 | 91.2 %, 88.3 %, .0048, .49 |
+    | sns-optimal, (6, 7) | 100 %, 99.9 %, .00001, .02 | 100 %, 99.8 %, .00006, .14 |
     | pinv[after=scale], (3, 7) | 31.1 %, 9.3 %, .262, .84 | 33.8 %, 10.5 %, .251, .83 |
     | sns, (3, 7) | 98.9 %, 89.4 %, .0015, .15 | 99.4 %, 91.1 %, .0009, .12 |
-    | sns-optimal, (3, 7) | 99.5 %, 92.8 %, .0006, .07 | 99.6 %, 93.9 %, .0004, .06 |
+    | sns-optimal, (3, 7) | 100 %, 100 %, 0, 0 | 100 %, 100 %, 0, .005 |
     """
     pairs = list(rethink_states(count, m, n, symmetric=symmetric))
     problems, given = [problem for problem, _ in pairs], np.array([s for _, s in pairs])
@@ -199,7 +201,9 @@ def test_share_that_reaches_the_true_scale(m: int, n: int, symmetric: bool, coun
         assert np.mean(s > given - SAME) > (0.8 if n - m == 1 else 0.97)
         assert np.mean(lp - s) < (0.02 if n - m == 1 else 0.003)
     basic, optimal = reached
-    assert np.mean(lp - optimal) <= (1 if n - m == 1 else 0.7) * np.mean(lp - basic)
+    assert np.all(optimal > basic - SAME)
+    assert np.mean(optimal > lp - SAME) > 0.99
+    assert np.mean(lp - optimal) < 0.02 * np.mean(lp - basic)
 
 
 @pytest.mark.parametrize("law", SNS)
@@ -308,6 +312,78 @@ def test_lower_levels_are_scaled_too(law: str) -> None:
     assert scaled > 20
 
 
+def test_letting_go_at_a_lower_level_reaches_the_linear_program() -> None:
+    """Where `sns-optimal` lets go of a joint at the second level: never above the LP, mostly at it.
+
+    Those are the states in which it is `sns` for the first task alone and another for both.
+    """
+    random = np.random.default_rng(5)
+    gaps: dict[str, list[float]] = {law: [] for law in SNS}
+    for _ in range(1500):
+        upper = random.uniform(0.2, 2, 7)
+        first, second = [(random.normal(size=(2, 7)), 2 * random.normal(size=2)) for _ in range(2)]
+        alone, both = problem_of(-upper, upper, first), problem_of(-upper, upper, first, second)
+        one, two = ([answer(law, problem) for law in SNS] for problem in (alone, both))
+        if np.abs(one[0] - one[1]).max() > 1e-9 or np.abs(two[0] - two[1]).max() < 1e-6:
+            continue
+        J, V = second
+        largest = second_scale(both, first[0] @ one[0])
+        assert largest is not None
+        for law, v in zip(SNS, two, strict=True):
+            s = float(J @ v @ V / (V @ V))
+            np.testing.assert_allclose(first[0] @ (v - one[0]), np.zeros(2), atol=1e-9)
+            gaps[law].append(largest - s)
+            assert np.abs(J @ v - s * V).max() < 1e-9
+    basic, optimal = (np.array(gaps[law]) for law in SNS)
+    print(
+        f"\nlet go at level 2 {len(optimal)} times: at the LP in {np.mean(optimal < SAME):.0%}, "
+        f"mean gap {optimal.mean():.4f}; held: {np.mean(basic < SAME):.0%}, {basic.mean():.4f}"
+    )
+    assert len(optimal) > 30
+    assert optimal.min() > -SAME
+    assert np.mean(optimal < SAME) > 0.95
+    assert np.mean(basic < SAME) < 0.5
+
+
+@pytest.mark.parametrize("factor", [1.0, 3.0])
+def test_answers_in_saturated_motion_under_acceleration_limits(factor: float) -> None:
+    """The step after a saturated one: nearly wherever the linear program answers, and as far.
+
+    The box is about the velocity before, which is not the least one; the least one is outside it.
+    """
+    free = load_robot("panda")
+    robot = free.with_limits(acceleration=free.available_acceleration)
+    position, limit = robot.limits.position, robot.limits.velocity
+    assert position is not None
+    assert limit is not None
+    random, kinematics = np.random.default_rng(0), Kinematics(robot)
+    feasible, gaps = 0, []
+    for _ in range(300):
+        q = random.uniform(position.lower, position.upper)
+        kinematics.update(q)
+        J = kinematics.jacobian(robot.frame_id).copy()
+        V = factor * J @ random.uniform(limit.lower, limit.upper)
+        task = LinearizedTask(J, V, np.zeros(6))
+        before = ask("sns", DikProblem(free, q, None, 0.01, [task], free.limits.at(q)))
+        if before is None:
+            continue
+        q = q + 0.01 * before
+        kinematics.update(q)
+        task = LinearizedTask(kinematics.jacobian(robot.frame_id).copy(), V, np.zeros(6))
+        problem = DikProblem(robot, q, before, 0.01, [task], robot.limits.at(q))
+        if ask(LP, problem) is None:
+            continue
+        feasible += 1
+        if ask("sns", problem) is not None:
+            basic, lp = (scale(law, problem) for law in ("sns", LP))
+            gaps.append(lp - basic)
+    print(f"\nin motion at {factor}x: {len(gaps)} of {feasible}, mean gap {np.mean(gaps):.5f}")
+    assert feasible > 80
+    assert len(gaps) > 0.98 * feasible
+    assert min(gaps) > -SAME
+    assert np.mean(gaps) < 2e-3
+
+
 @pytest.mark.parametrize("law", SNS)
 def test_level_that_does_not_fit_is_left_out(law: str) -> None:
     """A second task for which no scale fits moves nothing, and the third still has its turn."""
@@ -388,7 +464,7 @@ def test_answers_wherever_the_box_allows_rest_and_mostly_elsewhere(law: str) -> 
         answered += v is not None
     print(f"\n{law}: answers {answered} of {feasible} feasible programs whose box excludes rest")
     assert feasible > 100
-    assert answered > 0.8 * feasible
+    assert answered > 0.98 * feasible
 
 
 def problem_of_box(lower: Array, upper: Array, J: Array, V: Array) -> DikProblem:
