@@ -43,6 +43,9 @@ def saturated_levels(
 ) -> Array:
     """Every priority level in turn, each in the null space of those above, inside the box.
 
+    Where the box excludes rest, as under acceleration limits in motion, the least velocity may have
+    so many joints outside it that no saturation helps: then the least change of velocity.
+
     Raises:
         Infeasible: if no scale of the first task was found for which the box holds.
     """
@@ -50,6 +53,9 @@ def saturated_levels(
     levels = problem.levels
     for number, level in enumerate(levels):
         found = _saturated(level, v, N, box, rank_tolerance, optimal=optimal)
+        if found is None and number == 0 and problem.v_prev is not None:
+            start = _inside(problem.v_prev, box)
+            found = _saturated(level, start, N, box, rank_tolerance, optimal=optimal)
         if found is not None:
             v = found
         elif number == 0:

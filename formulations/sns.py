@@ -30,15 +30,18 @@ class SaturationInNullSpace:
     J (m, nv) and V (m,) are each level's, poses in the task frame; v in rad/s. Strict priority
     with bounds active or not; never off course and inside every limit; stops short of the largest
     s in some states (one in twenty on a Panda asked for too much). At a singularity it does what
-    the pseudo-inverse does. Where the box excludes rest (outside a limit, or braking) there may be
-    no s for the first task: `Infeasible`. Weights play no part.
+    the pseudo-inverse does. Where the box excludes rest (outside a limit, or in motion under
+    acceleration limits) this may find no s for the first task: then it starts again with
+    v_N = v_prev, so that the least change of the velocity is what joints are held of. `Infeasible`
+    where that finds none either. Weights play no part.
 
     Attributes:
         braking: how the box approaches a position limit (see `dikbench.box`).
         rank_tolerance: singular values of J W up to this count as zero (absolute, units of J).
 
-    Source: [Flacco2012]; [Flacco2015]. Only joints outside the box are saturated, which the papers
-    do not say and boxes that exclude rest need.
+    Source: [Flacco2012]; [Flacco2015], whose saturation of accelerations is the second start. Only
+    joints outside the box are saturated, which the papers do not say and boxes that exclude rest
+    need.
     """
 
     braking: Braking = "viable"

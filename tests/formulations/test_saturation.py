@@ -308,6 +308,79 @@ def test_lower_levels_are_scaled_too(law: str) -> None:
     assert scaled > 20
 
 
+def test_letting_go_at_a_lower_level_never_passes_the_linear_program() -> None:
+    """Where `sns-optimal` lets go of a joint at the second level: at the LP in half of the states.
+
+    Those are the states in which it is `sns` for the first task alone and another for both. The
+    multipliers are those of the norm: in the other half it comes less near than `sns`, which holds.
+    Weighing the motion of the level above as well lets go in twice as many, to reach it in 26 %.
+    """
+    random = np.random.default_rng(5)
+    gaps: dict[str, list[float]] = {law: [] for law in SNS}
+    for _ in range(1500):
+        upper = random.uniform(0.2, 2, 7)
+        first, second = [(random.normal(size=(2, 7)), 2 * random.normal(size=2)) for _ in range(2)]
+        alone, both = problem_of(-upper, upper, first), problem_of(-upper, upper, first, second)
+        one, two = ([answer(law, problem) for law in SNS] for problem in (alone, both))
+        if np.abs(one[0] - one[1]).max() > 1e-9 or np.abs(two[0] - two[1]).max() < 1e-6:
+            continue
+        J, V = second
+        largest = second_scale(both, first[0] @ one[0])
+        assert largest is not None
+        for law, v in zip(SNS, two, strict=True):
+            s = float(J @ v @ V / (V @ V))
+            np.testing.assert_allclose(first[0] @ (v - one[0]), np.zeros(2), atol=1e-9)
+            gaps[law].append(largest - s)
+            assert np.abs(J @ v - s * V).max() < 1e-9
+    basic, optimal = (np.array(gaps[law]) for law in SNS)
+    print(
+        f"\nlet go at level 2 {len(optimal)} times: at the LP in {np.mean(optimal < SAME):.0%}, "
+        f"mean gap {optimal.mean():.4f}; held: {np.mean(basic < SAME):.0%}, {basic.mean():.4f}"
+    )
+    assert 20 < len(optimal) < 30
+    assert optimal.min() > -SAME
+    assert np.mean(optimal < SAME) > 0.4
+
+
+@pytest.mark.parametrize("factor", [1.0, 3.0])
+def test_answers_in_saturated_motion_under_acceleration_limits(factor: float) -> None:
+    """The step after a saturated one: nearly wherever the linear program answers, and as far.
+
+    The box is about the velocity before, which is not the least one; the least one is outside it.
+    """
+    free = load_robot("panda")
+    robot = free.with_limits(acceleration=free.available_acceleration)
+    position, limit = robot.limits.position, robot.limits.velocity
+    assert position is not None
+    assert limit is not None
+    random, kinematics = np.random.default_rng(0), Kinematics(robot)
+    feasible, gaps = 0, []
+    for _ in range(300):
+        q = random.uniform(position.lower, position.upper)
+        kinematics.update(q)
+        J = kinematics.jacobian(robot.frame_id).copy()
+        V = factor * J @ random.uniform(limit.lower, limit.upper)
+        task = LinearizedTask(J, V, np.zeros(6))
+        before = ask("sns", DikProblem(free, q, None, 0.01, [task], free.limits.at(q)))
+        if before is None:
+            continue
+        q = q + 0.01 * before
+        kinematics.update(q)
+        task = LinearizedTask(kinematics.jacobian(robot.frame_id).copy(), V, np.zeros(6))
+        problem = DikProblem(robot, q, before, 0.01, [task], robot.limits.at(q))
+        if ask(LP, problem) is None:
+            continue
+        feasible += 1
+        if ask("sns", problem) is not None:
+            basic, lp = (scale(law, problem) for law in ("sns", LP))
+            gaps.append(lp - basic)
+    print(f"\nin motion at {factor}x: {len(gaps)} of {feasible}, mean gap {np.mean(gaps):.5f}")
+    assert feasible > 80
+    assert len(gaps) > 0.98 * feasible
+    assert min(gaps) > -SAME
+    assert np.mean(gaps) < 2e-3
+
+
 @pytest.mark.parametrize("law", SNS)
 def test_level_that_does_not_fit_is_left_out(law: str) -> None:
     """A second task for which no scale fits moves nothing, and the third still has its turn."""
@@ -388,7 +461,7 @@ def test_answers_wherever_the_box_allows_rest_and_mostly_elsewhere(law: str) -> 
         answered += v is not None
     print(f"\n{law}: answers {answered} of {feasible} feasible programs whose box excludes rest")
     assert feasible > 100
-    assert answered > 0.8 * feasible
+    assert answered > 0.98 * feasible
 
 
 def problem_of_box(lower: Array, upper: Array, J: Array, V: Array) -> DikProblem:
