@@ -58,8 +58,9 @@ class Contents:
 
     @property
     def description(self) -> str:
-        """What the study is, in a line, without a full stop."""
-        return str(self.manifest["study"].get("description", "")).rstrip(".")
+        """What the study is, in a sentence."""
+        text = str(self.manifest["study"].get("description", "")).strip()
+        return text if text.endswith((".", "?", "!")) or not text else f"{text}."
 
     @cached_property
     def counts(self) -> list[tuple[int, str]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import re
+import textwrap
 from dataclasses import dataclass
 from typing import Final
 
@@ -55,7 +56,7 @@ def parse_docstring(text: str) -> Docstring:
         elif title:
             titled[title[1]] = " ".join(part[title.end() :].split()).rstrip(".")
         elif all(line.startswith("    ") for line in part.split("\n")) and part:
-            paragraphs.append(Paragraph(inspect.cleandoc(part), program=True))
+            paragraphs.append(Paragraph(textwrap.dedent(part), program=True))
         elif part.strip():
             paragraphs.append(Paragraph(" ".join(part.split()), program=False))
     return Docstring(first.strip(), tuple(paragraphs), entries, titled)

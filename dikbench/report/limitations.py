@@ -129,8 +129,8 @@ def _seeds(trials: pd.DataFrame) -> list[Limitation]:
     if len(seeds) == 1:
         return [
             Limitation(
-                f"There is one seed ({seeds[0]}): the numbers have no interval over seeds, and "
-                "small differences between laws may be those of these scenarios."
+                f"There is one seed ({seeds[0]}): intervals are over scenarios and not over seeds, "
+                "and small differences between laws may be those of these scenarios."
             )
         ]
     return []

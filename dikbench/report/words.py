@@ -80,7 +80,7 @@ class Names:
             return name
         others = [solver for solver in every if solver not in solvers]
         if not others:
-            return f"{name} (all {len(every)} solvers)"
+            return f"{name} ({'both' if len(every) == 2 else f'all {len(every)}'} solvers)"
         if len(others) < len(solvers):
             return f"{name} (all solvers but {listed([quoted(solver) for solver in others])})"
         return f"{name} ({listed([quoted(solver) for solver in solvers])})"

@@ -197,6 +197,12 @@ def test_the_markdown_says_the_same(report: Path) -> None:
     assert "Most accurate" in text
     for figure in (report / "figures").glob("*.svg"):
         assert f"(figures/{figure.name})" in text
+    lines = text.split("\n")
+    for before, line, after in zip(lines, lines[1:], lines[2:], strict=False):
+        if line.startswith("#"):
+            assert before == after == "", line
+        if line == "":
+            assert before != "", "two blank lines"
 
 
 def test_a_figure_without_room_is_a_file_beside_the_page(
