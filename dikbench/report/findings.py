@@ -22,9 +22,12 @@ KEPT: Final = {
     "position_violation_max_rad": NEGLIGIBLE,
     "velocity_violation_max_rad_s": NEGLIGIBLE,
     "acceleration_violation_max_rad_s2": 1e3 * NEGLIGIBLE,
+    "distance_violation_max_m": NEGLIGIBLE,
+    "torque_violating_share": 0.0,
 }
 """Limits that are passed by no more than this are kept: a solver's tolerance; that of velocities,
-over a control period of 1 ms, is the one of accelerations."""
+over a control period of 1 ms, is the one of accelerations; of distances, what is not linear in a
+step. Limits of torques have their tolerance in the metric."""
 
 TRUSTED: Final = 0.01
 """Laws whose solver's answers fail the recheck in more than this share of a run's steps lead in
@@ -62,7 +65,7 @@ def candidates(rows: pd.DataFrame) -> list[Law]:
 
 def keepers(rows: pd.DataFrame) -> list[Law]:
     """The candidates that keep every limit that is in force, in every trial."""
-    worst = rows.groupby(LAW, sort=False)[list(KEPT)].max()
+    worst = rows.groupby(LAW, sort=False)[list(KEPT)].max().fillna(0.0)  # not in force: kept
     kept = (worst <= pd.Series(KEPT)).all(axis=1)
     return [law for law in candidates(rows) if kept[law]]
 
