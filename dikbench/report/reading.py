@@ -9,12 +9,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import msgspec
 import pandas as pd
 
 from dikbench.errors import DikbenchError
 from dikbench.metrics import METRICS
+from dikbench.report.words import several
 from dikbench.run.columns import KEYS, TIMES
 from dikbench.run.results import ResultsFolder
+from dikbench.selector import parse_selector
 
 TEXTS: Final = ("id", *KEYS, "environment", "timing_verdict")
 NUMBERS: Final = (
@@ -27,6 +30,34 @@ NUMBERS: Final = (
 )
 NEEDED: Final = tuple(name for name in KEYS if name != "message")
 """Columns without which a row says nothing."""
+
+SELECTORS: Final = ("formulation", "solver", "scenario", "plant")
+
+
+class _Cells(msgspec.Struct):
+    formulations: tuple[str, ...]
+    solvers: tuple[str, ...] = ()
+
+
+class _Study(msgspec.Struct):
+    name: str = ""
+    description: str = ""
+    example: str = ""
+    cells: tuple[_Cells, ...] = ()
+    scenarios: tuple[str, ...] = ()
+    plants: tuple[str, ...] = ()
+    references: tuple[str, ...] = ()
+    seeds: tuple[int, ...] = ()
+
+
+class Manifest(msgspec.Struct):
+    """What a report reads of a manifest; other versions may say more, and less."""
+
+    study: _Study
+    trials: int = 0
+    command: str = ""
+    libraries: dict[str, str | None] = {}
+    solvers: dict[str, str | None] = {}
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +91,8 @@ def read_results(path: Path) -> Results:
                 manifest = store.manifest()
                 versions = sorted({_version(made) for made in store.environments()})
                 trials = _complete(store.trials(), notes)
+            if trials.empty:
+                raise DikbenchError(f"no results in {path}: no trial has ended yet")
         except DikbenchError as error:
             if not (path / "trials.csv").is_file():
                 raise
@@ -69,6 +102,8 @@ def read_results(path: Path) -> Results:
                 notes.append(f"Rows were made by different versions: {', '.join(versions)}.")
             return Results(folder, trials, manifest, tuple(notes))
     trials = _complete(_rows(path / "trials.csv", notes), notes)
+    if trials.empty:
+        raise DikbenchError(f"no results in {path}: there is no row of a trial that can be read")
     environments = trials["environment"].nunique()
     if environments > 1:
         notes.append(f"Rows were made in {environments} different environments.")
@@ -93,12 +128,14 @@ def _rows(file: Path, notes: list[str]) -> pd.DataFrame:
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise DikbenchError(f"{file}: not a table of trials: {error}") from None
     header = lines[0] if lines else []
-    missing = [name for name in NEEDED if name not in header]
-    if missing:
-        raise DikbenchError(f"{file}: not a table of trials: it has no column {missing[0]!r}")
+    for name in NEEDED:
+        if header.count(name) != 1:
+            often = "no column" if name not in header else "more than one column"
+            raise DikbenchError(f"{file}: not a table of trials: it has {often} {name!r}")
     ended = lines[1:] if text.endswith("\n") else lines[1:-1]  # a value that was cut may look whole
     whole = [line for line in ended if len(line) == len(header)]
     rows = pd.DataFrame(whole, columns=header)
+    rows = rows.loc[:, ~rows.columns.duplicated()]
     rows = rows[(rows[list(NEEDED)] != "").all(axis=1)]
     if len(rows) < len(lines) - 1:
         left_out = len(lines) - 1 - len(rows)
@@ -125,20 +162,39 @@ def _complete(rows: pd.DataFrame, notes: list[str]) -> pd.DataFrame:
     }
     found = pd.DataFrame(columns, index=rows.index)
     found["timing_verdict"] = found["timing_verdict"].replace("", None)
-    whole = found[["seed", "steps"]].notna().all(axis=1)
+    whole = found[["seed", "steps"]].abs().lt(2**31).all(axis=1) & _named(found)
     if not whole.all():
-        notes.append(f"{int((~whole).sum())} rows without a seed or steps are left out.")
+        notes.append(
+            f"{several(int((~whole).sum()), 'row')} without a seed, steps or a selector that can "
+            "be read left out."
+        )
     return found[whole].astype({"seed": int, "steps": int}).reset_index(drop=True)
+
+
+def _named(rows: pd.DataFrame) -> pd.Series:
+    """Which rows have names that are selectors."""
+    named = pd.Series(True, rows.index)
+    for column in SELECTORS:
+        readable = {text for text in rows[column].unique() if _is_selector(text)}
+        named &= rows[column].isin(readable)
+    return named
+
+
+def _is_selector(text: str) -> bool:
+    try:
+        parse_selector(text)
+    except DikbenchError:
+        return False
+    return True
 
 
 def _manifest(file: Path, notes: list[str]) -> dict[str, Any]:
     """The description of a run; a short one in its place where it cannot be read."""
     try:
-        found = json.loads(file.read_text(encoding="utf-8"))
-        if isinstance(found, dict) and isinstance(found.get("study"), dict):
-            return found
-        reason = "it describes no study"
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        found: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        msgspec.convert(found, Manifest)
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError, msgspec.ValidationError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-    notes.append(f"The machine and the study are not known: {file.name}: {reason}.")
-    return {"study": {"name": file.parent.name, "description": "Results without a manifest"}}
+        notes.append(f"The machine and the study are not known: {file.name}: {reason}.")
+        return {"study": {"name": file.parent.name, "description": "Results without a manifest"}}
+    return found

@@ -121,7 +121,9 @@ def test_binary_in_place_of_the_table_is_one_line(tmp_path: Path) -> None:
         write_report(tmp_path)
 
 
-@pytest.mark.parametrize("manifest", [None, "", "{", "[]", '{"study": 1}', "\x00"])
+@pytest.mark.parametrize(
+    "manifest", [None, "", "{", "[]", '{"study": 1}', '{"study": {}, "trials": []}', "\x00"]
+)
 def test_a_manifest_that_cannot_be_read_is_said(
     tmp_path: Path, make_rows: MakeRows, write_results: WriteResults, manifest: str | None
 ) -> None:
@@ -166,6 +168,19 @@ def test_values_that_are_no_numbers_are_empty(
     folder = write_results(tmp_path / "out", rows)
     assert read_results(folder).trials["position_error_rms_m"].isna().tolist() == [True, False]
     write_report(folder)
+
+
+def test_rows_that_nobody_could_have_run_are_left_out(
+    tmp_path: Path, make_rows: MakeRows, write_results: WriteResults
+) -> None:
+    """A selector that is none, a seed that is no number; where nothing is left it is one line."""
+    rows = make_rows({"a[b=": {}, "pinv": {}, "dls": {}}).astype({"seed": object})
+    rows.loc[2, "seed"] = "inf"
+    found = read_results(write_results(tmp_path / "out", rows))
+    assert list(found.trials["formulation"]) == ["pinv"]
+    assert found.notes[0].startswith("2 rows without a seed, steps or a selector")
+    with pytest.raises(DikbenchError, match="there is no row"):
+        read_results(write_results(tmp_path / "none", rows.drop(index=1)))
 
 
 def test_rows_of_several_versions_are_said(run: Path, tmp_path: Path) -> None:
