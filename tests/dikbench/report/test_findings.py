@@ -136,6 +136,8 @@ def test_a_solvers_tolerance_breaks_no_limit_and_more_does(make_rows: MakeRows) 
             "kept": tolerance,
             "once": {"position_violation_max_rad": [0.0, 0.0, 1e-3]},
             "hard": {"acceleration_violation_max_rad_s2": [0.0, 0.0, 1.0]},
+            "touches": {"distance_violation_max_m": [float("nan"), 2e-4, 0.0]},
+            "strains": {"torque_violating_share": [float("nan"), float("nan"), 0.01]},
         },
         THREE,
     )

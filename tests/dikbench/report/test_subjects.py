@@ -10,6 +10,7 @@ from dikbench.registry import make_scenario, plugins
 from dikbench.report.docstring import parse_docstring
 from dikbench.report.situations import (
     AT_LIMITS,
+    CONSTRAINED,
     FREE,
     OUTSIDE,
     SINGULAR,
@@ -128,6 +129,8 @@ def test_families_say_what_they_certify(make_rows: MakeRows) -> None:
 @pytest.mark.parametrize(
     ("scenario", "situation"),
     [
+        ("obstacle[where=elbow]", CONSTRAINED),
+        ("torque-limited", CONSTRAINED),
         ("reach", UNREACHABLE),
         ("workspace-boundary", UNREACHABLE),
         ("start-outside", OUTSIDE),
