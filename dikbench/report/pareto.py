@@ -23,7 +23,10 @@ def draw_off_course_and_slow_down(ran: pd.DataFrame, target: Path) -> list[Figur
     tables = {how(rows): table for rows in parts if len(table := law_points(rows))}
     if not tables:
         return []
-    figure, axes = plt.subplots(len(tables), 1, figsize=(WIDTH, 3.5 * len(tables)), squeeze=False)
+    height = 3.5 if len(tables) <= 2 else 2.8
+    figure, axes = plt.subplots(
+        len(tables), 1, figsize=(WIDTH, height * len(tables)), squeeze=False
+    )
     for axis, (name, table) in zip(axes.flat, tables.items(), strict=True):
         _draw(axis, table)
         axis.set_title(name)

@@ -161,11 +161,12 @@ def _draw(grid: NearMissGrid, laws: Sequence[str], one: _Map, target: Path, file
         if failed.any():
             _cells(axis, edges, np.where(failed, 1.0, np.nan), ListedColormap([FAILED]))
         _write(axis, centres, one, values, failed)
-        axis.set_xlim(edges[0], edges[-1])
-        axis.set_ylim(0, rows)
-        axis.set_xticks(centres, [f"{miss:g}" for miss in grid.misses], rotation=90)
-        axis.set_yticks(np.arange(rows) + 0.5, [f"{speed:g}" for speed in grid.speeds])
         axis.tick_params(length=0, pad=2)
+        axis.tick_params(axis="x", labelrotation=90)
+    axes[0].set_xlim(edges[0], edges[-1])  # they share their axes
+    axes[0].set_ylim(0, rows)
+    axes[0].set_xticks(centres, [f"{miss:g}" for miss in grid.misses])
+    axes[0].set_yticks(np.arange(rows) + 0.5, [f"{speed:g}" for speed in grid.speeds])
     _key(figure, one)
     return save(figure, target, file)
 

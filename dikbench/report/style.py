@@ -146,13 +146,19 @@ def save(figure: Any, folder: Path, name: str) -> str:
 def _slim(svg: str) -> str:
     """An SVG in half of the bytes, fit to stand in a page with others.
 
-    Without the names of groups, which would be there twice, without rotations by nothing, with the
-    font named once and with hundredths of a point.
+    Without names of groups, which the others have too, and without a style sheet, which would be
+    the page's; with the font named once, no rotations by nothing, and hundredths of a point.
     """
+    sheet = re.search(r"<defs>\s*<style[^>]*>\*\{([^}]*)\}</style>\s*</defs>", svg)
     font = re.search(r"font-family: [^;\"]*", svg)
+    inherited = []
+    if sheet:
+        inherited.append(sheet[1])
+        svg = svg.replace(sheet[0], "", 1)
     if font:
+        inherited.append(font[0])
         svg = re.sub(r" ?" + re.escape(font[0]) + r";?", "", svg)
-        svg = svg.replace("<svg ", f'<svg style="{font[0]}" ', 1)
+    svg = svg.replace("<svg ", f'<svg style="{"; ".join(inherited)}" ', 1)
     svg = re.sub(r'<g id="[^"]*"/>\s*', "", svg)
     svg = re.sub(r'<g id="[^"]*"', "<g", svg)
     svg = re.sub(r' transform="rotate\(-?0 [^"]*\)"', "", svg)

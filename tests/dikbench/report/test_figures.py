@@ -66,6 +66,18 @@ def test_the_same_table_gives_the_same_bytes(make_trials: MakeTrials, tmp_path: 
     assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
 
 
+def test_an_svg_may_stand_in_a_page(make_trials: MakeTrials, tmp_path: Path) -> None:
+    """No SVG has a style sheet, or names for groups that another one has too; each has a font."""
+    for figure in drawn_in(tmp_path, make_trials(LAWS, SCENARIOS)):
+        root = ElementTree.fromstring((tmp_path / "figures" / figure.file).read_bytes())
+        tags = [element.tag.rpartition("}")[2] for element in root.iter()]
+        assert "style" not in tags
+        assert "text" in tags
+        assert not any("id" in group.attrib for group in root.iter("{http://www.w3.org/2000/svg}g"))
+        assert "DejaVu Sans" in root.attrib["style"]
+        assert "stroke-linejoin" in root.attrib["style"]
+
+
 def _none(trials: pd.DataFrame) -> pd.DataFrame:
     return trials.iloc[:0]
 
