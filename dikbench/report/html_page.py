@@ -5,7 +5,8 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib import resources
 from math import isnan
 from pathlib import Path
@@ -15,6 +16,7 @@ import jinja2
 from markupsafe import Markup
 
 from dikbench.report.contents import Contents
+from dikbench.report.figure import Figure
 from dikbench.report.spoken import to_html
 from dikbench.report.table import Cell, Column, shown
 
@@ -29,8 +31,8 @@ SECTIONS: Final = (
     ("made", "How it was made"),
 )
 
-MOST_OF_FIGURES: Final = 3_000_000
-"""Bytes of all figures that a page carries; what finds no room stays a file beside it."""
+MOST: Final = 9_500_000
+"""Bytes of a page; figures that find no room in it stay files beside it."""
 
 _VIEW: Final = re.compile(rb'viewBox="0 0 ([\d.]+) ([\d.]+)"')
 
@@ -96,12 +98,11 @@ def render_html(contents: Contents, figures: Path) -> str:
         "figure": lambda value: shown(value) if isinstance(value, float) else value,
         "capitalize_first": lambda text: text[:1].upper() + text[1:],
     }
-    return environment.get_template("page.html.j2").render(
-        contents=contents,
-        sections=SECTIONS,
-        assets=_assets(),
-        figures=_inlined(contents, figures),
-    )
+    template = environment.get_template("page.html.j2")
+    given = {"contents": contents, "sections": SECTIONS, "assets": _assets()}
+    bare = template.render(figures=[], **given)
+    room = (MOST - len(bare.encode())) * 3 // 4  # of four characters a figure has three bytes
+    return template.render(figures=_inlined(contents.figures, figures, room), **given)
 
 
 def _td(cell: Cell, column: Column) -> Markup:
@@ -135,26 +136,18 @@ def _hash(text: str) -> str:
     return f"sha256-{base64.b64encode(digest).decode()}"
 
 
-def _inlined(contents: Contents, folder: Path) -> list[Inlined]:
-    """The figures, drawn as lines where there is room, else as the dots of a PNG beside it."""
-    found, left = [], MOST_OF_FIGURES
-    for figure in contents.figures:
-        alt = figure.title or figure.caption
-        inlined = Inlined(figure.file, figure.caption, alt, "")
-        svg = _bytes(folder / figure.file)
-        view = _VIEW.search(svg[:2000])
-        width, height = (round(float(side) * 4 / 3) for side in view.groups()) if view else (0, 0)
-        for kind, content in (
-            ("svg+xml", svg),
-            ("png", _bytes((folder / figure.file).with_suffix(".png"))),
-        ):
-            if content and len(content) <= left:
-                left -= len(content)
-                uri = f"data:image/{kind};base64,{base64.b64encode(content).decode()}"
-                inlined = replace(inlined, uri=uri, width=width, height=height)
-                break
-        found.append(inlined)
-    return found
+def _inlined(figures: Sequence[Figure], folder: Path, room: int) -> list[Inlined]:
+    """The figures, the smallest of them within the page as long as there is room [bytes]."""
+    contents = [_bytes(folder / figure.file) for figure in figures]
+    fitting: set[int] = set()
+    for number in sorted(range(len(figures)), key=lambda number: len(contents[number])):
+        room -= len(contents[number])
+        if room >= 0:
+            fitting.add(number)
+    return [
+        _image(figure, content if number in fitting else b"")
+        for number, (figure, content) in enumerate(zip(figures, contents, strict=True))
+    ]
 
 
 def _bytes(file: Path) -> bytes:
@@ -163,3 +156,13 @@ def _bytes(file: Path) -> bytes:
         return file.read_bytes()
     except OSError:
         return b""
+
+
+def _image(figure: Figure, svg: bytes) -> Inlined:
+    alt = figure.title or figure.caption
+    if not svg:
+        return Inlined(figure.file, figure.caption, alt, "")
+    view = _VIEW.search(svg[:2000])
+    width, height = (round(float(side) * 4 / 3) for side in view.groups()) if view else (0, 0)
+    uri = f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
+    return Inlined(figure.file, figure.caption, alt, uri, width, height)
