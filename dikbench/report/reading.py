@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -16,6 +13,7 @@ from dikbench.errors import DikbenchError
 from dikbench.metrics import METRICS
 from dikbench.report.words import several
 from dikbench.run.columns import KEYS, TIMES
+from dikbench.run.exports import MANIFEST, TRIALS, read_manifest, read_trials
 from dikbench.run.results import ResultsFolder
 from dikbench.selector import parse_selector
 
@@ -28,9 +26,6 @@ NUMBERS: Final = (
     "control_time_s",
     *(name for name, (kind, _) in TIMES.items() if kind != "TEXT"),
 )
-NEEDED: Final = tuple(name for name in KEYS if name != "message")
-"""Columns without which a row says nothing."""
-
 SELECTORS: Final = ("formulation", "solver", "scenario", "plant")
 
 
@@ -94,53 +89,26 @@ def read_results(path: Path) -> Results:
             if trials.empty:
                 raise DikbenchError(f"no results in {path}: no trial has ended yet")
         except DikbenchError as error:
-            if not (path / "trials.csv").is_file():
+            if not (path / TRIALS).is_file():
                 raise
             notes.append(f"Read from trials.csv, for the store cannot be read: {error}.")
         else:
             if len(versions) > 1:
                 notes.append(f"Rows were made by different versions: {', '.join(versions)}.")
             return Results(folder, trials, manifest, tuple(notes))
-    trials = _complete(_rows(path / "trials.csv", notes), notes)
+    trials = _complete(read_trials(path, notes), notes)
     if trials.empty:
         raise DikbenchError(f"no results in {path}: there is no row of a trial that can be read")
     environments = trials["environment"].nunique()
     if environments > 1:
         notes.append(f"Rows were made in {environments} different environments.")
-    return Results(folder, trials, _manifest(path / "manifest.json", notes), tuple(notes))
+    return Results(folder, trials, _manifest(path, notes), tuple(notes))
 
 
 def _version(environment: dict[str, Any]) -> str:
     commit = environment.get("git_commit")
     version = f"dikbench {environment.get('libraries', {}).get('dikbench', 'unknown')}"
     return f"{version} (commit {commit[:8]}{'+' * commit.endswith('+')})" if commit else version
-
-
-def _rows(file: Path, notes: list[str]) -> pd.DataFrame:
-    """The rows of a CSV file as texts, without those that are cut off or have too many values."""
-    if not file.is_file():
-        raise DikbenchError(
-            f"no results in {file.parent}: neither results.sqlite nor {file.name} is there"
-        )
-    try:
-        text = file.read_text(encoding="utf-8")
-        lines = list(csv.reader(io.StringIO(text, newline="")))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise DikbenchError(f"{file}: not a table of trials: {error}") from None
-    header = lines[0] if lines else []
-    for name in NEEDED:
-        if header.count(name) != 1:
-            often = "no column" if name not in header else "more than one column"
-            raise DikbenchError(f"{file}: not a table of trials: it has {often} {name!r}")
-    ended = lines[1:] if text.endswith("\n") else lines[1:-1]  # a value that was cut may look whole
-    whole = [line for line in ended if len(line) == len(header)]
-    rows = pd.DataFrame(whole, columns=header)
-    rows = rows.loc[:, ~rows.columns.duplicated()]
-    rows = rows[(rows[list(NEEDED)] != "").all(axis=1)]
-    if len(rows) < len(lines) - 1:
-        left_out = len(lines) - 1 - len(rows)
-        notes.append(f"{file.name} is damaged: {left_out} of {len(lines) - 1} rows are left out.")
-    return rows.reset_index(drop=True)
 
 
 def _complete(rows: pd.DataFrame, notes: list[str]) -> pd.DataFrame:
@@ -188,13 +156,12 @@ def _is_selector(text: str) -> bool:
     return True
 
 
-def _manifest(file: Path, notes: list[str]) -> dict[str, Any]:
+def _manifest(folder: Path, notes: list[str]) -> dict[str, Any]:
     """The description of a run; a short one in its place where it cannot be read."""
     try:
-        found: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        found = read_manifest(folder)
         msgspec.convert(found, Manifest)
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError, msgspec.ValidationError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        notes.append(f"The machine and the study are not known: {file.name}: {reason}.")
-        return {"study": {"name": file.parent.name, "description": "Results without a manifest"}}
+    except (DikbenchError, msgspec.ValidationError) as error:
+        notes.append(f"The machine and the study are not known: {MANIFEST}: {error}.")
+        return {"study": {"name": folder.name, "description": "Results without a manifest"}}
     return found

@@ -12,7 +12,7 @@ import pandas as pd
 from filelock import FileLock, Timeout
 
 from dikbench.errors import DikbenchError
-from dikbench.run.exports import MANIFEST, TRIALS, are_exported, read_exports
+from dikbench.run.exports import MANIFEST, TRIALS, read_manifest, read_trials
 from dikbench.run.store import OtherVersion, Store
 
 
@@ -115,7 +115,7 @@ class ResultsFolder:
         Raises:
             DikbenchError: if the folder holds no results.
         """
-        exported = are_exported(self.path)
+        exported = (self.path / TRIALS).is_file()
         if not exported or self.database.is_file():
             try:
                 with self.open_store() as store:
@@ -123,7 +123,11 @@ class ResultsFolder:
             except OtherVersion:
                 if not exported:
                     raise
-        return read_exports(self.path)
+        notes: list[str] = []
+        trials = read_trials(self.path, notes)
+        if notes:
+            raise DikbenchError(f"{notes[0]} `dikbench report` reads what is left.")
+        return trials, read_manifest(self.path)
 
 
 def _replace(path: Path, write: Callable[[Path], object]) -> None:

@@ -124,7 +124,7 @@ def test_what_cannot_be_read_is_one_line(folder: Path, committed: Path, tmp_path
     with pytest.raises(DikbenchError, match=r"manifest\.json cannot be read"):
         dikbench.load_results(tmp_path)
     (tmp_path / "trials.csv").write_text("formulation,scenario\ndls,reach\n")
-    with pytest.raises(DikbenchError, match="lacks the column 'solver'"):
+    with pytest.raises(DikbenchError, match="it has no column 'solver'"):
         dikbench.load_results(tmp_path)
     (tmp_path / "trials.csv").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(DikbenchError, match=r"trials\.csv cannot be read"):
