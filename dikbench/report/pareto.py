@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -14,6 +14,9 @@ from dikbench.report.figure import Figure
 from dikbench.report.labels import label_points
 from dikbench.report.rows import how
 from dikbench.report.style import COLOURS, WIDTH, save, short
+
+DIGITS: Final = 3
+"""After the point, of deg and %; beyond these a law is not better, it is rounded otherwise."""
 
 
 def draw_off_course_and_slow_down(ran: pd.DataFrame, target: Path) -> list[Figure]:
@@ -80,7 +83,7 @@ def front(points: Array) -> Mask:
 def _draw(axis: Any, table: pd.DataFrame) -> None:
     keeping = table[~table["violating"]]
     passing = table[table["violating"]]
-    best = keeping[front(keeping[["slow_down", "off_course"]].to_numpy())]
+    best = keeping[front(keeping[["slow_down", "off_course"]].round(DIGITS).to_numpy())]
     best = best.sort_values(["slow_down", "off_course"], ascending=[True, False])
     axis.plot(
         best["slow_down"], best["off_course"], color="0.6", drawstyle="steps-post",

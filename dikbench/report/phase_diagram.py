@@ -251,7 +251,7 @@ def _key(figure: Any, one: _Map) -> None:
     )
     bar.set_label(one.bar)
     bar.ax.tick_params(pad=1)
-    label_decades(bar.ax.xaxis, bar.vmax / bar.vmin)
+    label_decades(bar.ax.xaxis, bar.vmin, bar.vmax)
     bar.outline.set_visible(False)
 
 

@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
+import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.layout_engine import ConstrainedLayoutEngine
@@ -28,8 +29,8 @@ WIDTH: Final = 7.2
 RESOLUTION: Final = 200
 """Of a PNG, and of what is an image in an SVG [dots per inch]."""
 
-FEW_DECADES: Final = 30.0
-"""An axis over less than this factor has numbers between its decades."""
+FEWEST_DECADES: Final = 2
+"""An axis with fewer of them has numbers between its decades."""
 
 LONGEST_NAME: Final = 26
 """Characters of a name that find room."""
@@ -113,13 +114,16 @@ def logarithmic(axis: Any, which: str) -> None:
     low, high = getattr(axis, f"get_{which}lim")()
     if not 0.0 < low < high < float("inf"):  # nothing is drawn
         low, high = getattr(axis, f"set_{which}lim")(0.1, 10.0)
-    label_decades(getattr(axis, f"{which}axis"), high / low)
+    label_decades(getattr(axis, f"{which}axis"), low, high)
 
 
-def label_decades(axis: Any, span: float) -> None:
-    """Write the numbers of a logarithmic x or y axis that spans such a factor."""
-    subs = (1.0,) if span > FEW_DECADES else (1.0, 2.0, 5.0)
-    axis.set_major_locator(LogLocator(subs=subs, numticks=6 if len(subs) == 1 else 12))
+def label_decades(axis: Any, low: float, high: float) -> None:
+    """Write the numbers of a logarithmic x or y axis between such limits."""
+    decades = np.floor(np.log10(high)) - np.ceil(np.log10(low)) + 1
+    if decades >= FEWEST_DECADES:
+        axis.set_major_locator(LogLocator(numticks=6))
+    else:
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_locator(NullLocator())
 

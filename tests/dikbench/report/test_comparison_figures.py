@@ -38,11 +38,13 @@ def test_points_of_off_course_and_slow_down(
     make_trials: MakeTrials, drawn: list[Any], target: Path
 ) -> None:
     """A point is the mean over the scenarios; a law that violates is hollow and off the front."""
-    trials = make_trials(["slow", "wide", "both", "violating"], SCENARIOS)
+    trials = make_trials(["slow", "wide", "both", "violating", "slower"], SCENARIOS)
     law = trials["formulation"]
-    trials["progress_mean"] = law.map({"slow": 0.5, "wide": 1.0, "both": 0.4, "violating": 1.0})
+    trials["progress_mean"] = law.map(
+        {"slow": 0.5, "wide": 1.0, "both": 0.4, "violating": 1.0, "slower": 0.1}
+    )
     trials["off_course_max_rad"] = np.radians(
-        law.map({"slow": 0.0, "wide": 90.0, "both": 90.0, "violating": 0.0})
+        law.map({"slow": 1e-9, "wide": 90.0, "both": 90.0, "violating": 0.0, "slower": 0.0})
     )
     trials["violating_share"] = law.eq("violating") * 0.1
     trials.loc[0, "progress_mean"] = 0.2
@@ -50,7 +52,7 @@ def test_points_of_off_course_and_slow_down(
         (figure,) = draw_off_course_and_slow_down(trials, target)
     axis = drawn[0].axes[0]
     keeping, violating = (set(map(tuple, dots.get_offsets())) for dots in axis.collections)
-    assert {(round(x), round(y)) for x, y in keeping} == {(60, 0), (0, 90), (60, 90)}
+    assert {(round(x), round(y)) for x, y in keeping} == {(60, 0), (0, 90), (60, 90), (90, 0)}
     assert violating == {(0.0, 0.0)}
     assert [round(x) for x in axis.lines[0].get_xdata()] == [0, 60]
     assert {text.get_text() for text in axis.texts} >= {"slow", "wide", "both", "violating"}

@@ -65,7 +65,9 @@ def test_errors_and_speeds_are_those_of_the_motion(
     """The largest value of each curve is the largest of the motion; laws without trace are out."""
     with style():
         (figure,) = draw_time_series(ResultsFolder(stored), trials, CROSSING, target)
-    errors, speeds = (curves([axis]) for axis in drawn[0].axes[:2])
+    columns = {axis.get_title(): curves([axis]) for axis in drawn[0].axes}
+    errors = columns["position error [mm]"]
+    speeds = columns["largest joint speed over limit"]
     assert errors.keys() == speeds.keys() == set(LAWS)
     for number, law in enumerate(LAWS):
         motion = motion_of(stored, number)
