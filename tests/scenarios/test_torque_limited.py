@@ -117,12 +117,11 @@ def test_lighter_payload_or_slower_lift_does_not_certify(
                 make_scenario(f"torque-limited[robot={robot}]")
 
 
-def test_payload_that_cannot_be_held_does_not_certify(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Half as much again is more than the joints can hold."""
+def test_payload_of_another_mass_does_not_certify(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A tenth more than the load asks for, lifted so that the torques of the motion are right."""
     module = sys.modules["scenarios.torque_limited"]
     compute = module._heaviest
-    monkeypatch.setattr(module, "_heaviest", lambda *given: 1.5 * compute(*given))
-    monkeypatch.setattr(module, "_shortest", lambda *given: 0.4)
+    monkeypatch.setattr(module, "_heaviest", lambda *given: 1.1 * compute(*given))
     with pytest.raises(DikbenchError, match=r"torque to hold it over limit .* is false"):
         make_scenario("torque-limited")
 
@@ -133,7 +132,7 @@ def test_payload_that_cannot_be_held_does_not_certify(monkeypatch: pytest.Monkey
         ("robot=planar4r", "planar4r"),
         ("robot=base", "effort limits"),
         ("robot=talos", "takes .* of its effort limits to hold itself; load=0.85"),
-        ("demand=1", "demand=1.0 must be between 1.1 and 2.0"),
+        ("demand=1", "demand=1.0 must be between 1.12 and 2.0"),
         ("load=1", "load=1.0 must be between 0.3 and 0.9"),
         ("height=0.5", "height=0.5 must be between 0.02 and 0.3"),
     ],
