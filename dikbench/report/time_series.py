@@ -69,7 +69,7 @@ def _columns(motions: Mapping[str, Motion]) -> dict[str, dict[str, Array]]:
     """What is drawn, with its label: the values of each law."""
     columns = {
         POSITION: {name: 1e3 * motion.position_error for name, motion in motions.items()},
-        CONTOUR: {name: 1e3 * _contour_error(motion) for name, motion in motions.items()},
+        CONTOUR: {name: 1e3 * motion.contour_error for name, motion in motions.items()},
         SPEED: {name: _speed_ratio(motion) for name, motion in motions.items()},
     }
     same = all(
@@ -79,11 +79,6 @@ def _columns(motions: Mapping[str, Motion]) -> dict[str, dict[str, Array]]:
     if same:  # there is no path
         del columns[CONTOUR]
     return columns
-
-
-def _contour_error(motion: Motion) -> Array:
-    error: Array = getattr(motion, "contour_error", motion.position_error)
-    return error
 
 
 def _speed_ratio(motion: Motion) -> Array:

@@ -87,7 +87,7 @@ def test_the_contour_error_stands_beside_it_where_there_is_a_path(
 ) -> None:
     """A contour error that differs from the position error has panels of its own."""
     half = property(lambda motion: 0.5 * motion.position_error)
-    monkeypatch.setattr(Motion, "contour_error", half, raising=False)
+    monkeypatch.setattr(Motion, "contour_error", half)
     with style():
         draw_time_series(ResultsFolder(stored), trials, CROSSING, target)
     errors, contours, _ = (curves([axis]) for axis in drawn[0].axes[:3])
