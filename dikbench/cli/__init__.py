@@ -288,7 +288,7 @@ def show(name: str, figure: Path | None) -> None:
 
     text = description(name)
     if figure is not None:
-        from dikbench.report.scenario_figure import draw_scenario
+        from dikbench.report.figures.scenario import draw_scenario
 
         draw_scenario(name, figure)
         text += f"\n\n{figure}"

@@ -12,7 +12,7 @@ import pandas as pd
 from dikbench.comparison.comparison import Comparison
 from dikbench.comparison.matching import trial_name
 from dikbench.errors import DikbenchError
-from dikbench.report.markdown import escape, markdown_rows
+from dikbench.report.tables.markdown import escape, markdown_rows
 
 ON_CONSOLE: Final = 20
 """So many rows of a list are printed; a file holds all."""

@@ -11,15 +11,15 @@ from typing import Any
 import pandas as pd
 
 from dikbench.metrics import METRICS
-from dikbench.report.figure import Figure
-from dikbench.report.limitations import Limitation, limitations, missing
+from dikbench.report.figures.figure import Figure
+from dikbench.report.pages.subjects import Family, Law, families_of, laws_of
 from dikbench.report.reading import Results
-from dikbench.report.return_codes import return_codes
-from dikbench.report.subjects import Family, Law, families_of, laws_of
-from dikbench.report.summary import Summary, summarise
-from dikbench.report.table import Table
-from dikbench.report.table_kinds import KINDS
-from dikbench.report.tables import make_table
+from dikbench.report.sentences.limitations import Limitation, limitations, missing
+from dikbench.report.sentences.summary import Summary, summarise
+from dikbench.report.tables.kinds import KINDS
+from dikbench.report.tables.make import make_table
+from dikbench.report.tables.return_codes import return_codes
+from dikbench.report.tables.table import Table
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,17 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 
 from dikbench.errors import DikbenchError
-from dikbench.report.console import to_text
 from dikbench.report.contents import Contents, gather
-from dikbench.report.figures import draw_figures
-from dikbench.report.html_page import render_html
-from dikbench.report.markdown import markdown_rows
-from dikbench.report.markdown_page import render_markdown
+from dikbench.report.figures.draw import draw_figures
+from dikbench.report.pages.html_page import render_html
+from dikbench.report.pages.markdown_page import render_markdown
 from dikbench.report.reading import read_results
-from dikbench.report.return_codes import TITLE as RETURN_CODES
-from dikbench.report.table_files import write_table
-from dikbench.report.table_kinds import TIMING
-from dikbench.report.tables import make_table
+from dikbench.report.tables.console import to_text
+from dikbench.report.tables.files import write_table
+from dikbench.report.tables.kinds import TIMING
+from dikbench.report.tables.make import make_table
+from dikbench.report.tables.markdown import markdown_rows
+from dikbench.report.tables.return_codes import TITLE as RETURN_CODES
 from dikbench.run.results import ResultsFolder
 from dikbench.run.stability import STABLE
 

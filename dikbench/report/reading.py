@@ -11,7 +11,7 @@ import pandas as pd
 
 from dikbench.errors import DikbenchError
 from dikbench.metrics import METRICS
-from dikbench.report.words import several
+from dikbench.report.sentences.words import several
 from dikbench.run.columns import KEYS, TIMES
 from dikbench.run.exports import MANIFEST, TRIALS, read_manifest, read_trials
 from dikbench.run.results import ResultsFolder

@@ -10,7 +10,7 @@ import pinocchio as pin
 from pinocchio.visualize import MeshcatVisualizer
 
 from dikbench.array import Array, Indices
-from dikbench.report.scenario_figure import stick
+from dikbench.report.figures.scenario import stick
 from dikbench.robot import Robot
 from dikbench.viewer.animation import Moving, animation
 from dikbench.viewer.bodies import bodies

@@ -8,7 +8,7 @@ import pytest
 
 from dikbench import BoxObstacle, CapsuleObstacle, SphereObstacle
 from dikbench.obstacles import Obstacle
-from dikbench.report.obstacle_surface import surface
+from dikbench.report.figures.obstacle_surface import surface
 
 TURNED = tuple(map(tuple, pin.utils.rpyToMatrix(0.3, -0.5, 0.8).tolist()))
 OBSTACLES: list[Obstacle] = [

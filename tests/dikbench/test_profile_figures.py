@@ -9,10 +9,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-import dikbench.report.profile_figures as figures
-from dikbench.report.profile_figures import NAMED, Costs, draw_profiles
-from dikbench.report.rows import LEAST_ERROR
-from dikbench.report.style import style
+import dikbench.report.figures.profiles as figures
+from dikbench.report.figures.profiles import NAMED, Costs, draw_profiles
+from dikbench.report.figures.rows import LEAST_ERROR
+from dikbench.report.figures.style import style
 
 INF = np.inf
 

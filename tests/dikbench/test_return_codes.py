@@ -15,7 +15,7 @@ from dikbench.plants import Plant, saturating
 from dikbench.problem import DikProblem, Solve
 from dikbench.quadratic_program import Program, QuadraticProgram
 from dikbench.registry import make_scenario
-from dikbench.report.return_codes import return_codes
+from dikbench.report.tables.return_codes import return_codes
 from dikbench.robot_catalogue import load_robot
 from dikbench.run.worker import run_trial
 from dikbench.simulation import simulate

@@ -15,13 +15,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dikbench.report import latex_table, markdown
-from dikbench.report.console import NAME, ROWS, WIDTH, to_text
-from dikbench.report.csv_table import to_csv
-from dikbench.report.latex_table import to_latex, to_latex_per_family
-from dikbench.report.markdown import markdown_blocks, markdown_rows, to_markdown
-from dikbench.report.table import Block, Cell, Column, Row, Table, shown
-from dikbench.report.table_files import write_table
+from dikbench.report.tables import latex_table, markdown
+from dikbench.report.tables.console import NAME, ROWS, WIDTH, to_text
+from dikbench.report.tables.csv_table import to_csv
+from dikbench.report.tables.files import write_table
+from dikbench.report.tables.latex_table import to_latex, to_latex_per_family
+from dikbench.report.tables.markdown import markdown_blocks, markdown_rows, to_markdown
+from dikbench.report.tables.table import Block, Cell, Column, Row, Table, shown
 
 HOSTILE = (
     "<script>alert('x')</script>",

@@ -13,11 +13,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dikbench.report.csv_table import to_csv
-from dikbench.report.table import Block, Cell, Table
-from dikbench.report.table_files import write_table
-from dikbench.report.table_kinds import KINDS, LIMIT_VIOLATION, TIMING, TRACKING_ERROR
-from dikbench.report.tables import make_table
+from dikbench.report.tables.csv_table import to_csv
+from dikbench.report.tables.files import write_table
+from dikbench.report.tables.kinds import KINDS, LIMIT_VIOLATION, TIMING, TRACKING_ERROR
+from dikbench.report.tables.make import make_table
+from dikbench.report.tables.table import Block, Cell, Table
 
 Rows = list[dict[str, str]]
 

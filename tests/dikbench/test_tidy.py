@@ -127,7 +127,7 @@ def test_what_cannot_be_read_is_one_line(folder: Path, committed: Path, tmp_path
     with pytest.raises(DikbenchError, match="it has no column 'solver'"):
         dikbench.load_results(tmp_path)
     (tmp_path / "trials.csv").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(DikbenchError, match=r"trials\.csv cannot be read"):
+    with pytest.raises(DikbenchError, match=r"trials\.csv: not a table of trials"):
         dikbench.load_results(tmp_path)
 
 

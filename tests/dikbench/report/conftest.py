@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from dikbench.metrics import METRICS
-from dikbench.report import style as style_module
+from dikbench.report.figures import style as style_module
 from dikbench.run.columns import RATES, TIMES
 
 MakeTrials = Callable[..., pd.DataFrame]

@@ -12,12 +12,12 @@ import pandas as pd
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dikbench.report.error_and_time import cost_points, draw_error_and_time
-from dikbench.report.labels import label_points
-from dikbench.report.pareto import draw_off_course_and_slow_down, front, law_points
-from dikbench.report.rows import that_ran
-from dikbench.report.style import style
-from dikbench.report.time_split import PARTS, draw_time_split, time_parts
+from dikbench.report.figures.error_and_time import cost_points, draw_error_and_time
+from dikbench.report.figures.labels import label_points
+from dikbench.report.figures.pareto import draw_off_course_and_slow_down, front, law_points
+from dikbench.report.figures.rows import that_ran
+from dikbench.report.figures.style import style
+from dikbench.report.figures.time_split import PARTS, draw_time_split, time_parts
 
 MakeTrials = Callable[..., pd.DataFrame]
 

@@ -12,9 +12,9 @@ import pandas as pd
 import pytest
 
 from dikbench.metrics import METRICS
-from dikbench.report.figure import Figure
-from dikbench.report.figures import draw_figures
-from dikbench.report.style import file_name, short
+from dikbench.report.figures.draw import draw_figures
+from dikbench.report.figures.figure import Figure
+from dikbench.report.figures.style import file_name, short
 from dikbench.run.columns import TIMES
 from dikbench.run.results import ResultsFolder
 

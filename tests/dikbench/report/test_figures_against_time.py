@@ -13,11 +13,11 @@ import pytest
 from dikbench.motion import Motion, recompute
 from dikbench.plants import Plant
 from dikbench.registry import make_formulation, make_scenario
-from dikbench.report.figures import draw_figures
-from dikbench.report.joint_margins import draw_joint_margins, joint_margin
-from dikbench.report.stored_motions import in_panels, thinned
-from dikbench.report.style import style
-from dikbench.report.time_series import draw_time_series
+from dikbench.report.figures.draw import draw_figures
+from dikbench.report.figures.joint_margins import draw_joint_margins, joint_margin
+from dikbench.report.figures.stored_motions import in_panels, thinned
+from dikbench.report.figures.style import style
+from dikbench.report.figures.time_series import draw_time_series
 from dikbench.run.results import ResultsFolder
 from dikbench.simulation import simulate
 from dikbench.solvers.checked import make_solve

@@ -7,8 +7,8 @@ import pandas as pd
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dikbench.report.comparison import ROUNDING, SAME, lead
-from dikbench.report.findings import (
+from dikbench.report.sentences.comparison import ROUNDING, SAME, lead
+from dikbench.report.sentences.findings import (
     fail_most,
     fastest,
     keep_limits,
@@ -17,7 +17,7 @@ from dikbench.report.findings import (
     most_accurate_within_limits,
     stay_on_course,
 )
-from dikbench.report.words import Names, number
+from dikbench.report.sentences.words import Names, number
 
 MakeRows = Callable[..., pd.DataFrame]
 

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from dikbench.report.page import write_report
-from dikbench.report.table import Cell, Column
+from dikbench.report.tables.table import Cell, Column
 
 MakeRows = Callable[..., pd.DataFrame]
 WriteResults = Callable[..., Path]
@@ -212,7 +212,7 @@ def test_a_figure_without_room_is_a_file_beside_the_page(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The page stays small, and says where the figure is."""
-    monkeypatch.setattr("dikbench.report.html_page.MOST", 100)
+    monkeypatch.setattr("dikbench.report.pages.html_page.MOST", 100)
     folder = write_results(tmp_path / "out", make_rows({"pinv": {}}))
     write_report(folder)
     page = Page.of(folder / "report.html")
@@ -222,7 +222,7 @@ def test_a_figure_without_room_is_a_file_beside_the_page(
 
 def test_cells_are_sorted_by_their_number() -> None:
     """What a cell sorts by is its number, whatever stands beside it."""
-    from dikbench.report.html_page import _td
+    from dikbench.report.pages.html_page import _td
 
     column = Column("a", "a", "a")
     assert _td(Cell(float("nan")), column) == "<td></td>"

@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from dikbench.report.limitations import in_plan, limitations, missing
+from dikbench.report.sentences.limitations import in_plan, limitations, missing
 
 MakeRows = Callable[..., pd.DataFrame]
 STUDY: dict[str, Any] = {"study": {"name": "a"}}

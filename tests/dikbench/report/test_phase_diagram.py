@@ -11,10 +11,10 @@ import pandas as pd
 import pytest
 from matplotlib.collections import QuadMesh
 
-from dikbench.report.near_miss_grids import near_miss_grids
-from dikbench.report.outcomes import OUTCOMES, outcomes
-from dikbench.report.phase_diagram import draw_phase_diagrams, three_digits
-from dikbench.report.style import style
+from dikbench.report.figures.near_miss_grids import near_miss_grids
+from dikbench.report.figures.outcomes import OUTCOMES, outcomes
+from dikbench.report.figures.phase_diagram import draw_phase_diagrams, three_digits
+from dikbench.report.figures.style import style
 
 MakeTrials = Callable[..., pd.DataFrame]
 

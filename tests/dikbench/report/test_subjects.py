@@ -7,8 +7,9 @@ import pandas as pd
 import pytest
 
 from dikbench.registry import make_scenario, plugins
-from dikbench.report.docstring import parse_docstring
-from dikbench.report.situations import (
+from dikbench.report.pages.docstring import parse_docstring
+from dikbench.report.pages.subjects import families_of, laws_of
+from dikbench.report.sentences.situations import (
     AT_LIMITS,
     CONSTRAINED,
     FREE,
@@ -20,7 +21,6 @@ from dikbench.report.situations import (
     Situation,
     situation_of,
 )
-from dikbench.report.subjects import families_of, laws_of
 
 MakeRows = Callable[..., pd.DataFrame]
 

@@ -10,11 +10,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dikbench.report.law_sweeps import draw_law_sweeps, law_sweeps
-from dikbench.report.style import style
-from dikbench.report.sweep_figures import draw_sweeps
-from dikbench.report.sweeps import sweeps
-from dikbench.report.value_scale import ValueScale
+from dikbench.report.figures.law_sweeps import draw_law_sweeps, law_sweeps
+from dikbench.report.figures.scenario_sweeps import draw_sweeps
+from dikbench.report.figures.style import style
+from dikbench.report.figures.sweeps import sweeps
+from dikbench.report.figures.value_scale import ValueScale
 
 MakeTrials = Callable[..., pd.DataFrame]
 

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from dikbench.report.scenario_figure import stick
+from dikbench.report.figures.scenario import stick
 from dikbench.robot_catalogue import ROBOTS, load_robot
 from dikbench.robot_data import DataModel
 from dikbench.viewer.bodies import bodies, capsules

@@ -1,0 +1,138 @@
+"""Error, peak speed and violation against a parameter of a law, per family of scenarios."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+
+from dikbench.report.figures.figure import Figure
+from dikbench.report.figures.rows import LEAST_ERROR, error_column, how, one_way, with_failures
+from dikbench.report.figures.stored_motions import in_panels
+from dikbench.report.figures.style import WIDTH, file_name, logarithmic, look, marker, save, short
+from dikbench.report.figures.sweeps import FEWEST, number
+from dikbench.report.figures.value_scale import ValueScale
+from dikbench.report.tables.make import family
+from dikbench.selector import parse_selector
+
+
+@dataclass(frozen=True, eq=False)
+class LawSweep:
+    """Trials of one law of which one numeric parameter takes several values.
+
+    Attributes:
+        law: its name.
+        parameter: what is swept.
+        others: its other parameters, as in a selector.
+        rows: its trials, with columns `value` and `family`.
+    """
+
+    law: str
+    parameter: str
+    others: str
+    rows: pd.DataFrame
+
+
+def law_sweeps(ran: pd.DataFrame) -> list[LawSweep]:
+    """Find the laws of which one numeric parameter takes at least three values."""
+    chosen = one_way(ran)
+    groups: dict[tuple[str, str, str], dict[str, float]] = {}
+    for formulation in dict.fromkeys(chosen["formulation"]):
+        selector = parse_selector(formulation)
+        for parameter, text in selector.parameters.items():
+            value = number(text)
+            if value is not None:
+                rest = (f"{k}={v}" for k, v in selector.parameters.items() if k != parameter)
+                key = (selector.name, parameter, ",".join(rest))
+                groups.setdefault(key, {})[formulation] = value
+    found = []
+    for (law, parameter, others), values in groups.items():
+        if len(set(values.values())) >= FEWEST:
+            rows = chosen[chosen["formulation"].isin(values)]
+            rows = rows.assign(
+                value=rows["formulation"].map(values), family=rows["scenario"].map(family)
+            )
+            found.append(LawSweep(law, parameter, others, rows))
+    return found
+
+
+def draw_law_sweeps(ran: pd.DataFrame, target: Path) -> list[Figure]:
+    """Draw every sweep of a numeric parameter of a law."""
+    figures = []
+    for place, sweep in enumerate(law_sweeps(ran), start=1):
+        if not np.isfinite(per_family(sweep)["error"]).any():
+            continue
+        _, name = error_column(sweep.rows)
+        file = file_name("law", sweep.law, sweep.parameter, place)
+        caption = (
+            f"{sweep.law}{f' ({sweep.others})' if sweep.others else ''} against its "
+            f"{sweep.parameter}, {how(sweep.rows)}: the median rms {name}, the largest peak "
+            "speed and the largest share of steps that pass a limit, over the scenarios of each "
+            "family; a failed trial counts as infinite, and infinity leaves a gap."
+        )
+        title = f"{sweep.law} against its {sweep.parameter}"
+        figures.append(Figure(_draw(sweep, target, file), caption, title))
+    return figures
+
+
+def per_family(sweep: LawSweep) -> pd.DataFrame:
+    """Per family and value the median `error` [mm], the worst `peak` speed and `violating` [%]."""
+    column, _ = error_column(sweep.rows)
+    rows = sweep.rows
+    table = pd.DataFrame(
+        {
+            "family": rows["family"],
+            "value": rows["value"],
+            "error": 1e3 * with_failures(rows, column),
+            "peak": with_failures(rows, "velocity_peak_ratio"),
+            "violating": 100.0 * with_failures(rows, "violating_share"),
+        }
+    )
+    groups = table.groupby(["family", "value"], sort=False)
+    taken = groups.agg({"error": "median", "peak": "max", "violating": "max"})
+    return taken.sort_index(level="value")
+
+
+def _draw(sweep: LawSweep, target: Path, file: str) -> str:
+    _, name = error_column(sweep.rows)
+    quantities = {
+        "error": f"rms {name} [mm],\nmedian",
+        "peak": "peak speed over limit,\nworst",
+        "violating": "steps that pass a limit [%],\nworst",
+    }
+    table, scale = per_family(sweep), ValueScale(sweep.rows["value"])
+    table["error"] = table["error"].clip(lower=1e3 * LEAST_ERROR)
+    finite = table.where(table < float("inf"))
+    panels = in_panels(list(dict.fromkeys(sweep.rows["family"])))
+    figure, axes = plt.subplots(
+        len(panels),
+        len(quantities),
+        figsize=(WIDTH, 1.0 + 1.5 * len(panels)),
+        sharex=True,
+        sharey="col",
+        squeeze=False,
+    )
+    for line, families in zip(axes, panels, strict=True):
+        for axis, quantity in zip(line, quantities, strict=True):
+            for place, kind in enumerate(families):
+                _curve(axis, scale, finite.loc[kind][quantity], short(kind, 22), place)
+        line[1].axhline(1.0, color="0.4", linewidth=0.7, zorder=1)
+        line[-1].legend(loc="center left", bbox_to_anchor=(1.02, 0.5))
+    for axis, label in zip(axes[0], quantities.values(), strict=True):
+        axis.set_title(label)
+    logarithmic(axes[0, 0], "y")
+    logarithmic(axes[0, 1], "y")
+    axes[0, 2].set_ylim(-4, 104)
+    scale.label(list(axes.flat))
+    figure.supxlabel(f"{short(sweep.parameter)} of {short(sweep.law)}", fontsize=8)
+    return save(figure, target, file)
+
+
+def _curve(axis: Any, scale: ValueScale, curve: pd.Series, label: str, place: int) -> None:
+    style = {**look(place), **marker(place), "linewidth": 1.2}
+    points = scale.curve(curve.index.to_numpy(dtype=float), curve.to_numpy())
+    axis.plot(*points, label=label, markersize=3.5, **style)

@@ -1,0 +1,266 @@
+"""The phase diagram: what each law makes of near misses, over miss distance and speed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib import colormaps
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, LogNorm, Normalize, to_rgb
+from matplotlib.patches import Patch
+
+from dikbench.array import Array, Mask
+from dikbench.oracle import ORACLE
+from dikbench.report.figures.figure import Figure
+from dikbench.report.figures.near_miss_grids import NearMissGrid, near_miss_grids
+from dikbench.report.figures.outcomes import OFF_COURSE, OUTCOMES, SLOW, outcomes
+from dikbench.report.figures.panels import place_at_top, small_multiples
+from dikbench.report.figures.rows import error_column, how, pages, with_failures
+from dikbench.report.figures.style import label_decades, save
+
+PER_PAGE = 20
+"""Laws in one figure."""
+
+GAP = 0.18
+"""Between the column of miss = 0, which is a case of its own, and the others [cells]."""
+
+FAILED = "#222222"
+
+OUTCOME_COLOURS = ("#e8f1e4", "#56B4E9", "#E69F00", "#D55E00", FAILED)
+OUTCOME_MARKS = ("", "s", "o", "v", "x")
+
+
+@dataclass(frozen=True, eq=False)
+class _Map:
+    """A quantity over a grid: its values per law, how they are coloured and written.
+
+    Without the label of a colour bar it is of categories.
+    """
+
+    name: str
+    title: str
+    explained: str
+    values: Mapping[str, Array]
+    colours: Colormap
+    norm: Normalize
+    text: Callable[[float], str]
+    bar: str = ""
+
+
+def draw_phase_diagrams(ran: pd.DataFrame, target: Path) -> list[Figure]:
+    """Draw, for each grid of near misses, the error, the peak speed and the outcome per law."""
+    figures = []
+    for number, grid in enumerate(near_miss_grids(ran.assign(outcome=outcomes(ran))), start=1):
+        maps = [m for m in _maps(grid) if any(np.isfinite(v).any() for v in m.values.values())]
+        parts = pages(_laws_in_order(grid.rows), PER_PAGE)
+        for one in maps:
+            for page, laws in enumerate(parts, start=1):
+                file = f"phase_diagram_{number}_{one.name}" + (f"_{page}" * (len(parts) > 1))
+                of = f" (part {page} of {len(parts)})" if len(parts) > 1 else ""
+                caption = (
+                    f"{one.explained} Near misses ({grid.others or 'defaults'}), {how(grid.rows)}, "
+                    "a panel per law: the oracle, which moves along the path as asked for, then "
+                    f"from the best law to the worst{of}. Black: the trial failed."
+                )
+                title = (
+                    f"Phase diagram of near misses, {grid.others or 'defaults'}: {one.title}{of}"
+                )
+                figures.append(Figure(_draw(grid, laws, one, target, file), caption, title))
+    return figures
+
+
+def _laws_in_order(rows: pd.DataFrame) -> list[str]:
+    """The oracle first, then by the mean outcome, then by the median error."""
+    column, _ = error_column(rows)
+    worth = rows.assign(error=with_failures(rows, column))
+    by_law = worth.groupby("formulation", sort=False)
+    table = pd.DataFrame({"outcome": by_law["outcome"].mean(), "error": by_law["error"].median()})
+    order = table.sort_values(["outcome", "error"], kind="stable").index
+    return sorted(order, key=lambda name: name != ORACLE)
+
+
+def _maps(grid: NearMissGrid) -> list[_Map]:
+    column, name = error_column(grid.rows)
+    ended = grid.rows["status"].eq("ok")
+    rows = grid.rows.assign(
+        error_mm=1e3 * grid.rows[column].where(ended),
+        peak=grid.rows["velocity_peak_ratio"].where(ended),
+    )
+    shown = replace(grid, rows=rows)
+    errors, peaks = shown.values("error_mm", "median"), shown.values("peak", "median")
+    over = colormaps["YlOrRd"].with_extremes(under="#d5e3ee")
+    return [
+        _Map(
+            "error",
+            name,
+            f"Root mean square {name} [mm].",
+            errors,
+            colormaps["viridis_r"],
+            _log_norm(errors, 1e-2, 1e3),
+            three_digits,
+            f"rms {name} [mm]",
+        ),
+        _Map(
+            "peak_speed",
+            "peak speed",
+            "Largest joint speed over its limit; blue where it keeps the limit (to 1 %).",
+            peaks,
+            over,
+            _log_norm(peaks, 1.01, 1e2, least=1.01),
+            three_digits,
+            "largest joint speed over its limit",
+        ),
+        _Map(
+            "outcome",
+            "outcome",
+            "What became of the trial, the worst over its seeds: failed; else violating a limit; "
+            f"else off course (more than {np.degrees(OFF_COURSE):.0f} deg from the wanted "
+            f"direction at some step); else slow (less than {100 * SLOW:.0f} % of the wanted "
+            "motion at some step); else ok.",
+            shown.values("outcome", "max"),
+            ListedColormap(list(OUTCOME_COLOURS)),
+            BoundaryNorm(np.arange(-0.5, len(OUTCOMES)), len(OUTCOMES)),
+            lambda value: OUTCOME_MARKS[round(value)],
+        ),
+    ]
+
+
+def _log_norm(values: Mapping[str, Array], low: float, high: float, least: float = 0.0) -> LogNorm:
+    """A logarithmic scale from the smallest to the largest value, within bounds and a decade."""
+    whole = np.concatenate([v.ravel() for v in values.values()])
+    positive = whole[np.isfinite(whole) & (whole > 0)]
+    bottom = least or float(np.clip(positive.min(initial=high), low, high / 10))
+    top = float(np.clip(positive.max(initial=low), 10 * bottom, high))
+    return LogNorm(bottom, top)
+
+
+def _draw(grid: NearMissGrid, laws: Sequence[str], one: _Map, target: Path, file: str) -> str:
+    edges, centres = _columns(grid.misses)
+    rows = len(grid.speeds)
+    figure, axes = small_multiples(
+        laws,
+        0.2 * max(rows, 3),
+        "miss distance [m; rad]",
+        "speed [rad/s; m/s]",
+        top=0.68 if one.bar else 0.5,
+    )
+    outcome = grid.values("outcome", "max")
+    for axis, law in zip(axes, laws, strict=True):
+        axis.grid(visible=False)
+        axis.set_facecolor("white")
+        for side in ("left", "bottom"):
+            axis.spines[side].set_visible(False)
+        values = one.values[law]
+        failed = np.isnan(values) & (outcome[law] == OUTCOMES.index("failed"))
+        _cells(axis, edges, values, one.colours, one.norm)
+        if failed.any():
+            _cells(axis, edges, np.where(failed, 1.0, np.nan), ListedColormap([FAILED]))
+        _write(axis, centres, one, values, failed)
+        axis.tick_params(length=0, pad=2)
+        axis.tick_params(axis="x", labelrotation=90)
+    axes[0].set_xlim(edges[0], edges[-1])  # they share their axes
+    axes[0].set_ylim(0, rows)
+    axes[0].set_xticks(centres, [f"{miss:g}" for miss in grid.misses])
+    axes[0].set_yticks(np.arange(rows) + 0.5, [f"{speed:g}" for speed in grid.speeds])
+    _key(figure, one)
+    return save(figure, target, file)
+
+
+def _columns(misses: Sequence[float]) -> tuple[Array, Array]:
+    """Edges and centres of the columns; that of miss = 0 stands apart."""
+    apart = misses[0] == 0.0
+    edges = np.arange(len(misses) + 1.0 - apart)
+    centres = edges[:-1] + 0.5
+    if apart:
+        edges = np.concatenate([[-GAP - 1.0, -GAP], edges])
+        centres = np.concatenate([[-GAP - 0.5], centres])
+    return edges, centres
+
+
+def _cells(
+    axis: Any, edges: Array, values: Array, colours: Colormap, norm: Normalize | None = None
+) -> None:
+    """Colour the cells of a map; NaN leaves one as it is, and so stays the gap."""
+    if len(edges) > values.shape[1] + 1:
+        values = np.insert(values, 1, np.nan, axis=1)
+    axis.pcolormesh(
+        edges,
+        np.arange(len(values) + 1.0),
+        np.ma.masked_invalid(values),
+        cmap=colours,
+        norm=norm,
+        edgecolors="white",
+        linewidth=0.4,
+        rasterized=True,
+    )
+
+
+def _write(axis: Any, centres: Array, one: _Map, values: Array, failed: Mask) -> None:
+    for (row, column), value in np.ndenumerate(values):
+        if failed[row, column]:
+            text, colour = OUTCOME_MARKS[-1], "white"
+        elif np.isfinite(value):
+            text, colour = one.text(value), _readable_on(one.colours(one.norm(value)))
+        else:
+            continue
+        axis.text(
+            centres[column],
+            row + 0.47,
+            text,
+            ha="center",
+            va="center",
+            fontsize=5,
+            color=colour,
+            in_layout=False,
+        )
+
+
+def _readable_on(background: Any) -> str:
+    """Black or white, whichever stands out (relative luminance of sRGB)."""
+    linear = [
+        ((c + 0.055) / 1.055) ** 2.4 if c > 0.04045 else c / 12.92 for c in to_rgb(background)
+    ]
+    luminance = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+    return "black" if luminance > 0.18 else "white"
+
+
+def _key(figure: Any, one: _Map) -> None:
+    """The colour bar, or what the categories are called."""
+    if not one.bar:
+        names = [
+            f"{name} ({mark})" if mark else name
+            for name, mark in zip(OUTCOMES, OUTCOME_MARKS, strict=True)
+        ]
+        handles = [
+            Patch(facecolor=colour, edgecolor="0.6", linewidth=0.4, label=name)
+            for colour, name in zip(OUTCOME_COLOURS, names, strict=True)
+        ]
+        figure.legend(handles=handles, loc="upper center", ncols=len(handles))
+        return
+    bar = figure.colorbar(
+        ScalarMappable(one.norm, one.colours),
+        cax=place_at_top(figure, width=4.5, height=0.08, down=0.36),
+        orientation="horizontal",
+        ticklocation="top",
+        extend="both",
+    )
+    bar.set_label(one.bar)
+    bar.ax.tick_params(pad=1)
+    label_decades(bar.ax.xaxis, bar.vmin, bar.vmax)
+    bar.outline.set_visible(False)
+
+
+def three_digits(value: float) -> str:
+    """A number in at most three characters or so: 0, .03, .4, 2.1, 35, 420, 2e4."""
+    if value < 0.005:
+        return "0"
+    if value < 0.95:
+        return f"{value:.1g}".removeprefix("0")
+    if value < 9.95:
+        return f"{value:.1f}"
+    return f"{value:.0f}" if value < 999.5 else f"{value:.0e}".replace("e+0", "e")

@@ -1,0 +1,219 @@
+"""Performance profiles, with pairwise ones beside them, and data profiles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+
+from dikbench.array import Array
+from dikbench.oracle import ORACLE
+from dikbench.report.figures.figure import Figure
+from dikbench.report.figures.rows import LEAST_ERROR, how, one_solver_each
+from dikbench.report.figures.style import WIDTH, logarithmic, look, save, short
+from dikbench.statistics.data_profile import data_profile
+from dikbench.statistics.failures import has_failed, ran
+from dikbench.statistics.performance_profile import area, performance_ratios, profile
+from dikbench.statistics.problems import ProblemMatrix
+
+NAMED = 8
+"""Laws that are named in a picture; the others are grey."""
+
+PAIRS = 6
+"""Laws that are compared with the first one alone."""
+
+LARGEST = 1e3
+"""Ratio at which performance profiles end."""
+
+FACTORS = np.geomspace(1.0, LARGEST, 361)
+TARGETS = np.geomspace(1e-5, 1e-1, 241)
+
+GREY = {"color": "0.8", "linewidth": 0.7, "zorder": 1}
+STEPS = {"drawstyle": "steps-post"}
+
+
+def draw_profiles(trials: pd.DataFrame, target: Path) -> list[Figure]:
+    """Draw performance profiles for each plant and reference mode, and the data profiles of all.
+
+    Each law is drawn with the first of its solvers; the oracle is none.
+
+    Args:
+        trials: the rows of trials.csv, skipped and failed ones too.
+        target: the folder of figures.
+    """
+    laws = one_solver_each(ran(trials[trials["formulation"] != ORACLE]))
+    ways = [(how(rows), rows) for _, rows in laws.groupby(["plant", "reference"], sort=False)]
+    figures: list[Figure] = []
+    for name, rows in ways:
+        costs = Costs.of(rows, "rms")
+        if costs.comparable:
+            file = f"performance_profiles_{len(figures) + 1}"
+            figures.append(_performance(costs, name, target, file))
+    errors = {name: Costs.of(rows, "max") for name, rows in ways}
+    errors = {name: costs for name, costs in errors.items() if costs.comparable}
+    return [*figures, _data(errors, target)] if errors else figures
+
+
+@dataclass(frozen=True, eq=False)
+class Costs:
+    """The errors of laws on the same problems.
+
+    Attributes:
+        laws: names.
+        errors: (problems, laws) [m], at least `LEAST_ERROR`; infinite where a law did not solve
+            a problem: it failed, or was skipped.
+        words: what the errors are.
+    """
+
+    laws: list[str]
+    errors: Array
+    words: str
+
+    @classmethod
+    def of(cls, rows: pd.DataFrame, kind: str) -> Costs:
+        """The contour errors of trials, or their position errors where those were not measured.
+
+        Args:
+            rows: of one plant and reference mode.
+            kind: `rms` or `max`.
+        """
+        contour = f"contour_error_{kind}_m"
+        is_there = contour in rows and rows[contour].notna().any()
+        column = contour if is_there else f"position_error_{kind}_m"
+        words = (
+            f"{'rms' if kind == 'rms' else 'largest'} {'contour' if is_there else 'position'} error"
+        )
+        recorded = rows[column].to_numpy(dtype=float)
+        layout = ProblemMatrix.of(rows)
+        failed = has_failed(rows)
+        errors = layout.fill(np.where(failed, np.nan, np.maximum(recorded, LEAST_ERROR)))
+        # A problem that laws went through without an error to measure (no path) is none.
+        went_through = layout.fill(np.where(failed, 0.0, 1.0), 0.0).any(axis=1)
+        defined = ~np.isnan(errors).all(axis=1) | ~went_through
+        solved = np.where(np.isnan(errors), np.inf, errors)[defined]
+        return cls(list(layout.laws["formulation"]), solved, words)
+
+    @property
+    def comparable(self) -> bool:
+        """Whether there are two laws, and a problem that one of them solved."""
+        return len(self.laws) > 1 and bool(np.isfinite(self.errors).any())
+
+
+def _performance(costs: Costs, name: str, target: Path, file: str) -> Figure:
+    """All laws in one profile at the left, the first one against each of the next at the right."""
+    ratios = performance_ratios(costs.errors)
+    order = _order(ratios)
+    first, *others = order[: PAIRS + 1]
+    figure = plt.figure(figsize=(WIDTH, 3.6))
+    places = figure.add_gridspec(2, 5)
+    whole = figure.add_subplot(places[:, :2])
+    _curves(whole, costs.laws, order, FACTORS, profile(ratios, FACTORS))
+    whole.set_title("all laws")
+    whole.set_ylabel("share of the problems")
+    for place, (second, axis) in enumerate(zip(others, _small(figure, places), strict=False)):
+        pair = [first, second]
+        shares = profile(performance_ratios(costs.errors[:, pair]), FACTORS)
+        for column, number in enumerate((0, place + 1)):
+            axis.plot(FACTORS, shares[:, column], **{**look(number), **STEPS, "linewidth": 1.3})
+        _factor_axis(axis)
+        axis.set_title(f"against {short(costs.laws[second], 16)}")
+        axis.tick_params(labelleft=place % 3 == 0, labelbottom=place >= len(others) - 3)
+    _factor_axis(whole)
+    figure.supxlabel(f"{costs.words} over the smallest of the laws in the picture", fontsize=8)
+    figure.legend(*whole.get_legend_handles_labels(), loc="outside upper center", ncols=4)
+    caption = (
+        f"Performance profiles, {name}: the share of the {len(ratios)} problems (scenarios and "
+        f"seeds) on which the {costs.words} of a law is within a factor of the smallest; errors "
+        f"below {LEAST_ERROR:g} m count as equal, failed and skipped trials as not solved. The "
+        f"laws are ordered by the area under their curves{_left_over(order)}. Of many laws a "
+        f"profile ranks the first one only: at the right {costs.laws[first]} with each of the next "
+        f"laws alone.{_flip(costs, order)}"
+    )
+    return Figure(save(figure, target, file), caption, f"Performance profiles, {name}")
+
+
+def _data(errors: dict[str, Costs], target: Path) -> Figure:
+    """A panel per plant and reference mode; a law looks the same in all."""
+    heights: dict[str, list[float]] = {}
+    shares = {name: data_profile(costs.errors, TARGETS) for name, costs in errors.items()}
+    for name, costs in errors.items():
+        for law, height in zip(costs.laws, shares[name].mean(axis=0), strict=True):
+            heights.setdefault(law, []).append(float(height))
+    ranked = sorted(heights, key=lambda law: -float(np.mean(heights[law])))
+    rows = -(-len(errors) // 2)
+    figure, axes = plt.subplots(
+        rows, min(len(errors), 2), figsize=(WIDTH, 0.6 + 2.4 * rows), squeeze=False, sharey=True
+    )
+    for axis in axes.flat[len(errors) :]:
+        axis.set_visible(False)
+    for axis, (name, costs) in zip(axes.flat, errors.items(), strict=False):
+        order = [costs.laws.index(law) if law in costs.laws else -1 for law in ranked]
+        _curves(axis, costs.laws, order, TARGETS, shares[name])
+        axis.set_xlim(TARGETS[0], TARGETS[-1])
+        logarithmic(axis, "x")
+        axis.set_ylim(-0.02, 1.02)
+        axis.set_title(f"{name}, {len(costs.errors)} problems")
+        axis.set_xlabel(f"target: {costs.words} [m]")
+    for axis in axes[:, 0]:
+        axis.set_ylabel("share of the problems")
+    handles, labels = axes.flat[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=4)
+    caption = (
+        "Data profiles: the share of the problems (scenarios and seeds) that a law follows with "
+        "an error below a target all along the way; failed and skipped trials are not solved. A "
+        "curve does not depend on the other laws. The laws are ordered by their mean height"
+        f"{_left_over(ranked)}."
+    )
+    return Figure(save(figure, target, "data_profiles"), caption, "Data profiles")
+
+
+def _curves(axis: Any, laws: list[str], order: list[int], x: Array, shares: Array) -> None:
+    """Draw the curves of laws in an order, the first ones named; a law of -1 is not there."""
+    for number, law in enumerate(order):
+        if law < 0:
+            continue
+        if number < NAMED:
+            axis.plot(x, shares[:, law], label=short(laws[law]), **look(number), **STEPS)
+        else:
+            axis.plot(x, shares[:, law], **GREY, **STEPS)
+
+
+def _small(figure: Any, places: Any) -> Iterator[Any]:
+    """The axes of pairs, in reading order."""
+    for row in range(2):
+        for column in range(2, 5):
+            yield figure.add_subplot(places[row, column])
+
+
+def _factor_axis(axis: Any) -> None:
+    axis.set_xlim(0.93, LARGEST)  # the share at 1 is to be seen
+    logarithmic(axis, "x")
+    axis.set_ylim(-0.02, 1.02)
+
+
+def _order(ratios: Array) -> list[int]:
+    """Laws by the area under their profile, the largest first."""
+    return [int(law) for law in np.argsort(-area(ratios, LARGEST), kind="stable")]
+
+
+def _left_over(order: list[Any]) -> str:
+    return f", the {len(order) - NAMED} after the eighth in grey" if len(order) > NAMED else ""
+
+
+def _flip(costs: Costs, order: list[int]) -> str:
+    """A sentence where two named laws change places when the first one is taken out."""
+    others = order[1:NAMED]
+    kept = [order[1:][law] for law in _order(performance_ratios(costs.errors[:, order[1:]]))]
+    without = [law for law in kept if law in others]
+    for before, after in zip(others, without, strict=True):
+        if before != after:
+            return (
+                f" Without {costs.laws[order[0]]} the order changes: {costs.laws[after]} comes "
+                f"before {costs.laws[before]}."
+            )
+    return ""

@@ -1,0 +1,168 @@
+"""report.html: one file with everything in it."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import resources
+from math import isnan
+from pathlib import Path
+from typing import Final
+
+import jinja2
+from markupsafe import Markup
+
+from dikbench.report.contents import Contents
+from dikbench.report.figures.figure import Figure
+from dikbench.report.pages.spoken import to_html
+from dikbench.report.tables.table import Cell, Column, shown
+
+SECTIONS: Final = (
+    ("summary", "Summary"),
+    ("tables", "Tables"),
+    ("return-codes", "Return codes"),
+    ("figures", "Figures"),
+    ("families", "Families"),
+    ("laws", "Laws"),
+    ("limitations", "Limitations"),
+    ("made", "How it was made"),
+)
+
+MOST: Final = 9_500_000
+"""Bytes of a page; figures that find no room in it stay files beside it."""
+
+_VIEW: Final = re.compile(rb'viewBox="0 0 ([\d.]+) ([\d.]+)"')
+
+
+@dataclass(frozen=True)
+class Inlined:
+    """A figure as the page carries it.
+
+    Attributes:
+        file: its file name.
+        caption: what it shows.
+        alt: the same for those who do not see it.
+        uri: the figure itself; empty where it is too large.
+        width, height: its size [CSS pixels]; 0 where it is not known.
+    """
+
+    file: str
+    caption: str
+    alt: str
+    uri: str
+    width: int = 0
+    height: int = 0
+
+
+@dataclass(frozen=True)
+class Assets:
+    """Style and scripts of the page, with the hashes by which a browser lets them through."""
+
+    style: Markup
+    script: Markup
+
+    @property
+    def style_hash(self) -> str:
+        """Of the style, for the policy of the page."""
+        return _hash(self.style)
+
+    @property
+    def script_hash(self) -> str:
+        """Of the scripts."""
+        return _hash(self.script)
+
+
+def render_html(contents: Contents, figures: Path) -> str:
+    """The page.
+
+    Nothing but the scripts and the style that come with dikbench is run: the page's own policy
+    forbids every other one, and every connection.
+
+    Args:
+        contents: what it says.
+        figures: the folder of the figures.
+    """
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("dikbench.report.pages"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {
+        "code": to_html,
+        "td": _td,
+        "figure": lambda value: shown(value) if isinstance(value, float) else value,
+        "capitalize_first": lambda text: text[:1].upper() + text[1:],
+    }
+    template = environment.get_template("page.html.j2")
+    given = {"contents": contents, "sections": SECTIONS, "assets": _assets()}
+    bare = template.render(figures=[], **given)
+    room = (MOST - len(bare.encode())) * 3 // 4  # of four characters a figure has three bytes
+    return template.render(figures=_inlined(contents.figures, figures, room), **given)
+
+
+def _td(cell: Cell, column: Column) -> Markup:
+    """A number in its cell; it is sorted by `data-sort` where its text is more than the number."""
+    if isnan(cell.value):
+        return Markup("<td></td>")
+    number = str(int(cell.value)) if column.count else shown(cell.value)
+    failures = column.key.startswith("fail") and cell.value > 0
+    classes = ["best"] * cell.best + ["unstable"] * cell.unstable + ["bad"] * failures
+    attributes = f' class="{" ".join(classes)}"' if classes else ""
+    if cell.unstable:
+        attributes += ' title="these times cannot be trusted"'
+    bounds = ""
+    if cell.has_interval:
+        bounds = f"<small>[{shown(cell.lower)}, {shown(cell.upper)}]</small>"
+    if cell.has_interval or "inf" in number:
+        attributes += f' data-sort="{number.replace("inf", "Infinity")}"'
+    text = (number + bounds).replace("inf", "\N{INFINITY}")
+    return Markup(f"<td{attributes}>{text}</td>")  # numbers and words of ours: nothing to escape
+
+
+def _assets() -> Assets:
+    folder = resources.files("dikbench.report.pages") / "assets"
+    style = (folder / "report.css").read_text(encoding="utf-8")
+    scripts = [(folder / name).read_text(encoding="utf-8") for name in ("sortable.js", "report.js")]
+    return Assets(Markup(style), Markup("\n".join(scripts)))
+
+
+def _hash(text: str) -> str:
+    digest = hashlib.sha256(text.encode()).digest()
+    return f"sha256-{base64.b64encode(digest).decode()}"
+
+
+def _inlined(figures: Sequence[Figure], folder: Path, room: int) -> list[Inlined]:
+    """The figures, the smallest of them within the page as long as there is room [bytes]."""
+    contents = [_bytes(folder / figure.file) for figure in figures]
+    fitting: set[int] = set()
+    for number in sorted(range(len(figures)), key=lambda number: len(contents[number])):
+        room -= len(contents[number])
+        if room >= 0:
+            fitting.add(number)
+    return [
+        _image(figure, content if number in fitting else b"")
+        for number, (figure, content) in enumerate(zip(figures, contents, strict=True))
+    ]
+
+
+def _bytes(file: Path) -> bytes:
+    """The content of a file; none where it is not there."""
+    try:
+        return file.read_bytes()
+    except OSError:
+        return b""
+
+
+def _image(figure: Figure, svg: bytes) -> Inlined:
+    alt = figure.title or figure.caption
+    if not svg:
+        return Inlined(figure.file, figure.caption, alt, "")
+    view = _VIEW.search(svg[:2000])
+    width, height = (round(float(side) * 4 / 3) for side in view.groups()) if view else (0, 0)
+    uri = f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
+    return Inlined(figure.file, figure.caption, alt, uri, width, height)

@@ -1,0 +1,258 @@
+"""The sentences of a summary, each from the rows that carry it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import pandas as pd
+
+from dikbench.metrics.metric import NEGLIGIBLE
+from dikbench.report.sentences.comparison import SAME, Lead, lead
+from dikbench.report.sentences.words import (
+    Law,
+    Names,
+    degrees,
+    listed,
+    millimetres,
+    number,
+    several,
+)
+from dikbench.run.stability import DRIFT, STABLE
+from dikbench.statistics.problems import LAW
+
+ON_COURSE: Final = math.radians(1.0)
+"""A law that is never farther off course than this stays on it."""
+
+KEPT: Final = {
+    "position_violation_max_rad": NEGLIGIBLE,
+    "velocity_violation_max_rad_s": NEGLIGIBLE,
+    "acceleration_violation_max_rad_s2": 1e3 * NEGLIGIBLE,
+    "distance_violation_max_m": NEGLIGIBLE,
+    "torque_violating_share": 0.0,
+}
+"""Limits that are passed by no more than this are kept: a solver's tolerance; that of velocities,
+over a control period of 1 ms, is the one of accelerations; of distances, what is not linear in a
+step. Limits of torques have their tolerance in the metric."""
+
+TRUSTED: Final = 0.01
+"""Laws whose solver's answers fail the recheck in more than this share of a run's steps lead in
+nothing: a wrong answer can look better than the right one."""
+
+NOBODY: Final = "No law in this run"
+ALL_ANSWERED: Final = "No trial failed and every step was answered."
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A sentence and what it answers.
+
+    Attributes:
+        question: in a few words.
+        text: the sentence; names of laws stand between backticks.
+    """
+
+    question: str
+    text: str
+
+
+def candidates(rows: pd.DataFrame) -> list[Law]:
+    """The laws that ran every trial of the rows without failing, with answers that can be trusted.
+
+    Args:
+        rows: trials of one plant and one reference mode.
+    """
+    trials = len(rows[["scenario", "seed"]].drop_duplicates())
+    groups = rows.groupby(LAW, sort=False)
+    whole = rows.assign(ok=rows["status"].eq("ok")).groupby(LAW, sort=False)["ok"].sum() == trials
+    trusted = groups["not_verified_share"].max().fillna(0.0) <= TRUSTED
+    return list(whole[whole & trusted].index)
+
+
+def keepers(rows: pd.DataFrame) -> list[Law]:
+    """The candidates that keep every limit that is in force, in every trial."""
+    worst = rows.groupby(LAW, sort=False)[list(KEPT)].max().fillna(0.0)  # not in force: kept
+    kept = (worst <= pd.Series(KEPT)).all(axis=1)
+    return [law for law in candidates(rows) if kept[law]]
+
+
+def most_accurate(rows: pd.DataFrame, names: Names) -> Finding:
+    """Who follows the target most closely, whatever it takes."""
+    question = "Most accurate"
+    found = _closest(rows, candidates(rows))
+    if found is None:
+        return Finding(question, f"{NOBODY} went through all trials with answers to be trusted.")
+    leader, measure = found
+    text = _accuracy(leader, measure, names)
+    keeping = set(leader.laws) & set(keepers(rows))
+    if keeping == set(leader.laws):
+        text += ". Every limit is kept"
+    elif not keeping:
+        peaks = rows.groupby(LAW)["velocity_peak_ratio"].max()
+        peak = max(peaks[law] for law in leader.laws)
+        text += ". The limits are not kept"
+        text += f": joint speeds reach {number(peak)} times their limit" if peak > 1 else ""
+    return Finding(question, f"{text}.")
+
+
+def most_accurate_within_limits(rows: pd.DataFrame, names: Names) -> Finding:
+    """Who follows the target most closely of those that keep every limit."""
+    question = "Most accurate within the limits"
+    found = _closest(rows, keepers(rows))
+    if found is None:
+        return Finding(question, f"{NOBODY} keeps every limit here.")
+    if _closest(rows, candidates(rows)) == found:
+        return Finding(question, "The same.")
+    return Finding(question, f"{_accuracy(*found, names)}.")
+
+
+def keep_limits(rows: pd.DataFrame, names: Names) -> Finding:
+    """Who keeps every limit."""
+    laws, every = keepers(rows), rows[LAW].drop_duplicates()
+    question = "Keeps every limit"
+    if laws:
+        return Finding(
+            question,
+            f"{names.of(laws)}: {len(laws)} of {len(every)} laws with their solvers, in "
+            f"{_every_trial(rows)}.",
+        )
+    return Finding(question, f"{NOBODY} keeps every limit in {_every_trial(rows)}.")
+
+
+def stay_on_course(rows: pd.DataFrame, names: Names) -> Finding:
+    """Who slows down rather than leave the wanted direction, and who of them gets on best."""
+    question = "Stays on course"
+    worst = rows.groupby(LAW, sort=False)["off_course_max_rad"].max()
+    ran = [law for law in candidates(rows) if not math.isnan(worst[law])]
+    if not ran:
+        return Finding(question, f"{NOBODY} went through all trials with answers to be trusted.")
+    staying = [law for law in ran if worst[law] <= ON_COURSE]
+    if not staying:
+        least = min(ran, key=lambda law: float(worst[law]))
+        return Finding(
+            question,
+            f"{NOBODY} stays within {degrees(ON_COURSE)} of the wanted direction; "
+            f"nearest to it {names.of([least])}, at most {degrees(worst[least])} off.",
+        )
+    text = f"{names.of(staying)}: never more than {degrees(ON_COURSE)} off the wanted direction"
+    keeping = [law for law in keepers(rows) if law in set(staying)]
+    leader = lead(rows.assign(slowness=-rows["progress_mean"]), "slowness", keeping)
+    if leader is None:
+        return Finding(question, f"{text}, but none of them keeps every limit.")
+    speed = f"at {number(-100 * leader.value)} % of the wanted speed (median)"
+    if leader.runner_up is not None:
+        best = f"{names.of(leader.laws)} {'get' if len(leader.laws) > 1 else 'gets'} on best"
+    else:
+        best = names.of(keeping) + (" get on alike" if len(keeping) > 1 else " alone gets on")
+        if len(keeping) == len(staying) > 1:
+            best = "they get on alike"
+    return Finding(question, f"{text}. Within the limits {best}, {speed}.")
+
+
+def fail_most(rows: pd.DataFrame, names: Names) -> Finding:
+    """Who fails most: by trials that broke off, else by steps that a law had no answer for."""
+    question = "Fails most"
+    failed = rows["status"].ne("ok")
+    groups = rows.assign(failed=failed).groupby(LAW, sort=False)
+    shares = groups["failed"].mean()
+    if failed.any():
+        most = list(shares[shares.ge(shares.max() - SAME)].index)
+        counts = rows[failed].set_index(LAW).loc[most, "status"].value_counts()
+        reasons = listed([f"{number} {status}" for status, number in counts.items()])
+        ended = several(int(groups["failed"].sum()[most].sum()), "trial")
+        each = " each" if len(most) > 1 else ""
+        return Finding(
+            question,
+            f"{names.of(most)}: {number(100 * shares.max())} % of the trials{each} "
+            f"({ended}: {reasons}).",
+        )
+    unanswered = groups[["infeasible_share", "solver_failed_share"]].max().sum(axis=1)
+    worst = float(unanswered.max())
+    if worst <= 0:
+        return Finding(question, ALL_ANSWERED)
+    most = list(unanswered[unanswered.ge(worst - SAME)].index)
+    return Finding(
+        question,
+        f"No trial failed; {names.of(most)} had no answer in up to {number(100 * worst)} % of a "
+        "run's steps, and was slowed down.",
+    )
+
+
+def fastest(rows: pd.DataFrame, within_limits: Sequence[Law], names: Names) -> Finding:
+    """Whose call takes the least time, of all laws and of those that keep every limit.
+
+    Args:
+        rows: trials, of any plant.
+        within_limits: the laws that keep every limit.
+        names: how they are called.
+    """
+    question = "Fastest"
+    cells = rows.drop_duplicates([*LAW, "scenario"])
+    cells = cells[cells["law_time_median_us"].notna()]
+    if cells.empty:
+        return Finding(question, "No times were taken.")
+    timed = cells.groupby(LAW, sort=False)["scenario"].nunique()
+    medians = cells.groupby(LAW, sort=False)["law_time_median_us"].median()
+    medians = medians[timed.eq(timed.max())].sort_values(kind="stable")
+    parts = [_quickest(medians, names)]
+    keeping = medians[[law for law in medians.index if law in set(within_limits)]]
+    if len(keeping) and not set(keeping.index[:1]) <= set(_alike(medians)):
+        parts.append("of those that keep every limit " + _quickest(keeping, names))
+    if len(medians) > 1:
+        parts.append(
+            f"the slowest, {names.of([medians.index[-1]])}, takes "
+            f"{number(medians.iloc[-1] / medians.iloc[0])} times as long"
+        )
+    text = f"{'; '.join(parts)} (medians over {several(int(timed.max()), 'scenario')})."
+    unstable = int(cells["timing_verdict"].ne(STABLE).sum())
+    if unstable:
+        text += f" Of {len(cells)} timed cells {unstable} are not stable."
+    return Finding(question, text)
+
+
+def _quickest(medians: pd.Series, names: Names) -> str:
+    alike = _alike(medians)
+    if len(alike) == 1:
+        return f"{names.of(alike)} takes {number(medians.iloc[0])} us a call"
+    return (
+        f"{names.of(alike)} take {number(medians.iloc[0])} to {number(medians[alike].max())} "
+        f"us a call, which is not told apart (a stable time may drift by {number(100 * DRIFT)} %)"
+    )
+
+
+def _alike(medians: pd.Series) -> list[Law]:
+    """The laws whose times are no farther from the shortest than a stable time may drift."""
+    return list(medians[medians <= (1 + DRIFT) * medians.iloc[0]].index)
+
+
+def _closest(rows: pd.DataFrame, laws: Sequence[Law]) -> tuple[Lead, Callable[[float], str]] | None:
+    """Who leads in the position error, or in that of the orientation where there is no other."""
+    for metric, measure in (
+        ("position_error_rms_m", millimetres),
+        ("orientation_error_rms_rad", degrees),
+    ):
+        leader = lead(rows, metric, laws)
+        if leader is not None:
+            return leader, measure
+    return None
+
+
+def _accuracy(leader: Lead, measure: Callable[[float], str], names: Names) -> str:
+    one = leader.trials == 1
+    rms = "rms" if one else f"rms, median over {leader.trials} trials"
+    together = ", not told apart," if len(leader.laws) > 1 else ""
+    text = f"{names.of(leader.laws)}{together} with {measure(leader.value)} ({rms})"
+    if leader.runner_up is None:
+        return text
+    behind = "" if one else f", behind in {leader.wins} of {leader.trials}"
+    return (
+        f"{text}; next is {names.of([leader.runner_up])} with {measure(leader.runner_up_value)}"
+        f"{behind}"
+    )
+
+
+def _every_trial(rows: pd.DataFrame) -> str:
+    trials = len(rows[["scenario", "seed"]].drop_duplicates())
+    return "the only trial" if trials == 1 else f"all {trials} trials"

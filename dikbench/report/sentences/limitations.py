@@ -1,0 +1,253 @@
+"""What a reader must know before believing the tables, generated from the run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import pandas as pd
+
+from dikbench.oracle import ORACLE
+from dikbench.plants import DRIVES, REFERENCE_MODES
+from dikbench.registry import plugins
+from dikbench.report.sentences.words import listed, number, quoted, several
+from dikbench.run.stability import STABLE
+from dikbench.selector import parse_selector
+from dikbench.solvers.catalogue import BACK_ENDS, is_installed
+from dikbench.statistics.failures import SKIPPED, has_failed
+from dikbench.statistics.problems import LAW
+
+WORTH_SAYING: Final = 0.01
+"""A share of steps above this is remarked upon."""
+
+
+@dataclass(frozen=True)
+class Limitation:
+    """Something to keep in mind.
+
+    Attributes:
+        text: a sentence.
+        cases: where it applies, each a sentence; empty: everywhere.
+    """
+
+    text: str
+    cases: tuple[str, ...] = ()
+
+
+def limitations(
+    trials: pd.DataFrame, manifest: Mapping[str, Any], notes: Iterable[str]
+) -> list[Limitation]:
+    """Everything to keep in mind.
+
+    Args:
+        trials: the rows of trials.csv.
+        manifest: the manifest.
+        notes: what was found wrong when the results were read.
+    """
+    found = [Limitation(note) for note in notes]
+    found += _missing(trials, manifest)
+    found += _times(trials)
+    found += _seeds(trials)
+    found += _ways(trials)
+    found += _broken(trials)
+    found += _steps(trials)
+    found += _not_run(trials)
+    return found
+
+
+def missing(trials: pd.DataFrame, manifest: Mapping[str, Any]) -> int:
+    """How many trials were planned and have no row."""
+    inside = int(in_plan(trials, manifest["study"]).sum())
+    return max(0, int(manifest.get("trials", 0)) - inside)
+
+
+def _missing(trials: pd.DataFrame, manifest: Mapping[str, Any]) -> list[Limitation]:
+    """Trials without a row, and rows that the last study does not ask for."""
+    found = []
+    if lacking := missing(trials, manifest):
+        found.append(
+            f"The run is not complete: {lacking} of {manifest['trials']} trials are missing; its "
+            "command, given again, finishes it."
+        )
+    if others := int((~in_plan(trials, manifest["study"])).sum()):
+        found.append(
+            f"{several(others, 'row')} of earlier runs in this folder, which the last study does "
+            "not ask for, are counted with the others."
+        )
+    return [Limitation(text) for text in found]
+
+
+def in_plan(trials: pd.DataFrame, study: Mapping[str, Any]) -> pd.Series:
+    """Which rows the study asks for; all of them where it does not say."""
+    inside = pd.Series(True, trials.index)
+    for axis in ("scenario", "plant", "reference", "seed"):
+        if wanted := study.get(f"{axis}s"):
+            inside &= trials[axis].isin(wanted)
+    if cells := study.get("cells"):
+        asked = {
+            (formulation, solver)
+            for cell in cells
+            for formulation in cell["formulations"]
+            for solver in (*cell.get("solvers", ()), "none")
+        }
+        pairs = zip(trials["formulation"], trials["solver"], strict=True)
+        inside &= pd.Series([pair in asked for pair in pairs], trials.index)
+    return inside
+
+
+def _times(trials: pd.DataFrame) -> list[Limitation]:
+    if not trials["law_time_median_us"].notna().any():
+        return [Limitation("No times were taken: nothing is said of speed.")]
+    found = [
+        Limitation(
+            "Times are of one run on one machine: compare ratios. Solvers are called cold, through "
+            "qpsolvers, where their selector names no other interface."
+        )
+    ]
+    cells = trials.drop_duplicates([*LAW, "scenario"])
+    cells = cells[cells["timing_verdict"].notna()]
+    unstable = cells[cells["timing_verdict"] != STABLE]
+    if len(unstable):
+        found.append(
+            Limitation(
+                f"Of {len(cells)} timed cells {len(unstable)} are not stable (greyed; timing.csv "
+                "says why); `dikbench time` takes them anew, on a machine that does nothing else.",
+                tuple(
+                    f"{_law(formulation, solver)} on {quoted(scenario)}: {verdict}."
+                    for (formulation, solver, scenario, verdict), _ in _counted(
+                        unstable, [*LAW, "scenario", "timing_verdict"]
+                    )
+                ),
+            )
+        )
+    return found
+
+
+def _seeds(trials: pd.DataFrame) -> list[Limitation]:
+    seeds = sorted(trials["seed"].unique())
+    if len(seeds) == 1:
+        return [
+            Limitation(
+                f"There is one seed ({seeds[0]}): intervals are over scenarios and not over seeds, "
+                "and small differences between laws may be those of these scenarios."
+            )
+        ]
+    return []
+
+
+def _ways(trials: pd.DataFrame) -> list[Limitation]:
+    """How the trials were run, and what this does to the numbers."""
+    found = []
+    if trials["reference"].eq("time").all():
+        found.append(
+            "The reference moved on with the clock: laws that slow down fall behind by design. "
+            "Run with `--reference path` to let it wait for them."
+        )
+    found.append(
+        "A scenario without a path (a step) starts with its full error, which is then its largest: "
+        "see position_error_final_m."
+    )
+    found.append(
+        "Where a solver is far from the optimum its row measures the solver, not the law; a wrong "
+        "answer can look better than the right one."
+    )
+    wall, control = trials["wall_time_s"].sum(), trials["control_time_s"].sum()
+    if wall > 0:
+        found.append(
+            f"Of the workers' time {100 * control / wall:.0f} % went into kinematics, laws and "
+            "solvers, the rest into the harness (plant, records, recheck, metrics, traces)."
+        )
+    return [Limitation(text) for text in found]
+
+
+def _broken(trials: pd.DataFrame) -> list[Limitation]:
+    """Cells that were skipped and trials that failed, a case for each reason."""
+    found = []
+    skipped = trials[trials["status"] == SKIPPED]
+    if len(skipped):
+        text = f"{several(len(skipped), 'cell')} could not run."
+        found.append(Limitation(text, _reasons(skipped, "cell")))
+    failed = trials[has_failed(trials)]
+    if len(failed):
+        text = (
+            f"{several(len(failed), 'trial')} failed. Tables count them first; a failed trial "
+            "takes the worst value that a metric has."
+        )
+        found.append(Limitation(text, _reasons(failed, "trial")))
+    return found
+
+
+def _reasons(rows: pd.DataFrame, what: str) -> tuple[str, ...]:
+    """How often each status and message occurs, and with which laws."""
+    cases = []
+    for (status, message), part in rows.groupby(["status", "message"], sort=False):
+        laws = part[LAW].drop_duplicates().itertuples(index=False, name=None)
+        names = listed([_law(*law) for law in laws])
+        cases.append(f"{several(len(part), what)} {status}: {message} ({names}).")
+    return tuple(cases)
+
+
+def _steps(trials: pd.DataFrame) -> list[Limitation]:
+    """Steps that were not answered as they should be, per law."""
+    found = []
+    for column, text in (
+        (
+            "not_verified_share",
+            "Claims of success that the recheck denies: these rows measure the solver.",
+        ),
+        (
+            "infeasible_share",
+            "Programs without a feasible point: the fallback slowed the robot down.",
+        ),
+        (
+            "solver_failed_share",
+            "Feasible programs without an answer: the fallback slowed the robot down.",
+        ),
+        (
+            "relaxed_share",
+            "Acceleration bounds that were given up, where limits contradict one another.",
+        ),
+    ):
+        worst = trials.groupby(LAW, sort=False)[column].max().reset_index()
+        cases = tuple(
+            f"{_law(formulation, solver)}: in up to {number(100 * share)} % of a run's steps."
+            for formulation, solver, share in worst.itertuples(index=False, name=None)
+            if share > WORTH_SAYING
+        )
+        if cases:
+            found.append(Limitation(text, cases))
+    return found
+
+
+def _not_run(trials: pd.DataFrame) -> list[Limitation]:
+    """What is registered and no part of the run."""
+    ran = trials[trials["status"] != SKIPPED]
+    axes = (
+        ("laws", plugins("formulation"), "formulation"),
+        ("scenario families", plugins("scenario"), "scenario"),
+        ("solvers", [name for name in BACK_ENDS if is_installed(name)], "solver"),
+    )
+    cases = []
+    for what, known, column in axes:
+        used = {parse_selector(text).name for text in ran[column].unique()}
+        left_out = [name for name in known if name not in used]
+        if left_out:
+            names = listed([quoted(name) for name in left_out], most=None)
+            cases.append(f"{len(left_out)} of {len(known)} {what}: {names}.")
+    for column, modes in (("plant", DRIVES), ("reference", REFERENCE_MODES)):
+        used = {parse_selector(text).name for text in ran[column].unique()}
+        cases += [f"The {column} `{mode}`." for mode in modes if mode not in used]
+    if not trials["formulation"].eq(ORACLE).any():
+        cases.append("The oracle, a measure of how well a scenario can be done.")
+    return [Limitation("What was not run, and of which nothing is said.", tuple(cases))]
+
+
+def _law(formulation: str, solver: str) -> str:
+    return quoted(formulation) + ("" if solver == "none" else f" with {quoted(solver)}")
+
+
+def _counted(rows: pd.DataFrame, columns: list[str]) -> list[tuple[tuple[Any, ...], int]]:
+    """How many rows share the values of some columns."""
+    counts = rows.groupby(columns, sort=False, dropna=False).size().reset_index()
+    return [(tuple(key), int(count)) for *key, count in counts.itertuples(index=False, name=None)]

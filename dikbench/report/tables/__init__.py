@@ -1,0 +1,1 @@
+"""The tables of a report: what they hold, their numbers, and how they are written."""

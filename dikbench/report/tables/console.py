@@ -1,0 +1,96 @@
+"""The tables as they are printed at the end of a run: over all families, what fits a screen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isnan
+from textwrap import wrap
+
+from dikbench.report.tables.kinds import FAILURES
+from dikbench.report.tables.table import Block, Cell, Column, Row, Table, shown
+
+WIDTH = 120
+"""Characters to a line."""
+
+BLOCKS = 2
+"""Plants and reference modes that are printed of a table; the others stand in the files."""
+
+ROWS = 12
+"""Laws that are printed of a block."""
+
+NAME = 40
+"""Characters of a law with its solver."""
+
+HEADING = 12
+"""Characters to a line of a heading, unless a word is longer."""
+
+
+def to_text(table: Table) -> str:
+    """The blocks over all families: the most reliable laws first, then by their first average.
+
+    The first columns that fit are printed. The best of a column is starred, times that cannot be
+    trusted are followed by a question mark.
+    """
+    parts = [table.title, *(_block(table, block) for block in table.overall[:BLOCKS])]
+    if not table.blocks:
+        parts.append("Nothing was measured.")
+    left = len(table.overall) - BLOCKS
+    if left > 0:
+        parts.append(f"Other plants and reference modes ({left}): tables/{table.name}.md")
+    return "\n\n".join(parts) + "\n"
+
+
+def _block(table: Table, block: Block) -> str:
+    numbers = range(len(FAILURES), len(table.columns))
+    first = next((place for place in numbers if table.columns[place].interval), 0)
+    rows = sorted(block.rows, key=lambda row: (row.cells[0].value, *_last_if_nan(row.cells[first])))
+    top = rows[:ROWS]
+    columns = [
+        ["law", *(_name(row) for row in top)],
+        ["failed", *(f"{row.cells[1].value:.0f}/{row.cells[2].value:.0f}" for row in top)],
+    ]
+    for place in numbers:
+        column = table.columns[place]
+        columns.append([column.heading, *(_text(column, row.cells[place]) for row in top)])
+    lines = [block.setting] if block.setting else []
+    lines += _fitting(columns)
+    if len(rows) > ROWS:
+        lines.append(f"and {len(rows) - ROWS} more: tables/{table.name}.md")
+    return "\n".join(lines)
+
+
+def _last_if_nan(cell: Cell) -> tuple[bool, float]:
+    return (True, 0.0) if isnan(cell.value) else (False, cell.value)
+
+
+def _fitting(columns: Sequence[Sequence[str]]) -> list[str]:
+    """Lines of the first columns that fit, under headings of several lines."""
+    headings = [wrap(heading, HEADING) for heading, *_ in columns]
+    height = max(map(len, headings))
+    lines = [""] * (height + len(columns[0]) - 1)
+    for place, (heading, column) in enumerate(zip(headings, columns, strict=True)):
+        whole = [*[""] * (height - len(heading)), *heading, *column[1:]]
+        longest = max(map(len, whole))
+        if place == 0:
+            lines = [text.ljust(longest) for text in whole]
+        elif len(lines[0]) + 2 + longest > WIDTH:
+            break
+        else:
+            lines = [
+                f"{line}  {text.rjust(longest)}" for line, text in zip(lines, whole, strict=True)
+            ]
+    return [line.rstrip() for line in lines if line.strip()]
+
+
+def _name(row: Row) -> str:
+    name = row.formulation if row.solver == "none" else f"{row.formulation}, {row.solver}"
+    line = "".join(character for character in " ".join(name.split()) if character.isprintable())
+    return line if len(line) <= NAME else f"{line[: NAME - 3]}..."
+
+
+def _text(column: Column, cell: Cell) -> str:
+    if isnan(cell.value):
+        return ""
+    if column.count:
+        return f"{cell.value:.0f} "
+    return shown(cell.value) + "?" * cell.unstable + ("*" if cell.best else " ")
