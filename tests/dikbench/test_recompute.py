@@ -117,7 +117,7 @@ def harmed(fresh: Path, tmp_path_factory: pytest.TempPathFactory) -> Harmed:
         "ALTER TABLE trials DROP COLUMN position_error_rms_m",
     )
     with pytest.raises(DikbenchError, match=r"it lacks 'lag_max_s'.*`dikbench recompute`"):
-        copy.read()
+        copy.open_store()
     errors = io.StringIO()
     with redirect_stderr(errors):
         done = recompute_results(copy.path, 2, "")

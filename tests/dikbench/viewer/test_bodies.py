@@ -31,8 +31,8 @@ def test_locked_joints_lock_their_meshes(name: str) -> None:
     """Meshes of the reduced arm are where those of the whole robot are, others at zero."""
     build = ROBOTS[name].model
     assert isinstance(build, DataModel)
-    whole_model, robot = DataModel(build.path)(), load_robot(name)
-    whole, drawn = DataModel(build.path).visuals(), bodies(robot)
+    whole_model, robot = DataModel(build.urdf)(), load_robot(name)
+    whole, drawn = DataModel(build.urdf).visuals(), bodies(robot)
     q = np.random.default_rng(0).uniform(-0.5, 0.5, robot.nq)
     whole_q = pin.neutral(whole_model)
     for joint, value in zip(robot.model.names[1:], q, strict=True):
