@@ -105,6 +105,24 @@ class Motion:
         return path.distances(self.translations)
 
     @cached_property
+    def along(self) -> Array:
+        """Length of the way along the path that the frame has come, (n + 1,) [m].
+
+        To the nearest point of the path, never back (see `follow_path`); empty where there is no
+        way to go, or the task is about the orientation only.
+        """
+        path, tau = self.scenario.path, self.trace.tau
+        if path is None or path.is_point or np.isnan(self.position_error[0]):
+            return np.empty(0)
+        return follow_path(path, self.translations, np.interp(tau, path.times, path.arcs))
+
+    @cached_property
+    def path_done(self) -> float:
+        """Share of the path that lies behind the frame at the end; NaN where there is none."""
+        path = self.scenario.path
+        return float(self.along[-1] / path.arcs[-1]) if path and len(self.along) else np.nan
+
+    @cached_property
     def lag(self) -> Array:
         """Delay along the path, (n + 1,) [s].
 
@@ -115,11 +133,10 @@ class Motion:
         delay. NaN where the task is about the orientation only, or there is no way to go.
         """
         path, tau = self.scenario.path, self.trace.tau
-        if path is None or path.is_point or np.isnan(self.position_error[0]):
+        if path is None or not len(self.along):
             return np.full(len(tau), np.nan)
-        along = follow_path(path, self.translations, np.interp(tau, path.times, path.arcs))
         target = np.interp(tau, path.times, path.moving_times)
-        way = target - np.interp(along, path.arcs, path.moving_times)
+        way = target - np.interp(self.along, path.arcs, path.moving_times)
         lag: Array = np.maximum(way, 0.0) + (self.trace.dt * np.arange(len(tau)) - tau)
         return lag
 

@@ -30,6 +30,11 @@ CONTOUR = (
         "[Koren1980]",
     ),
     Metric(
+        "path_done_share", "", "high", 0.0, "tracking error",
+        "share of the path that lies behind the task frame at the end of the run",
+        lambda m: m.path_done,
+    ),
+    Metric(
         "lag_max_s", "s", "low", INF, "tracking error",
         "largest delay on the path: nominal time to go to the target, and how late that is itself",
         lambda m: largest(m.lag),

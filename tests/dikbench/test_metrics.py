@@ -130,6 +130,7 @@ ERRORS = (0, _chord(0.1), _chord(0.1), _chord(0.2), _chord(0.2))
         ("contour_error_p95_m", _chord(0.2)),
         ("contour_error_max_m", _chord(0.2)),
         ("contour_error_final_m", _chord(0.2)),
+        ("path_done_share", math.nan),
         ("lag_max_s", math.nan),
         ("lag_final_s", math.nan),
         ("null_space_drift_per_lap_rad", math.nan),
@@ -280,6 +281,7 @@ def test_a_start_outside_a_limit_is_not_a_step_that_violates_it() -> None:
 
 
 NEED_MORE = {
+    "path_done_share": "a path",
     "lag_max_s": "a path",
     "lag_final_s": "a path",
     "null_space_drift_per_lap_rad": "a lap",

@@ -27,10 +27,11 @@ def _trials(laws: dict[str, list[float]], **columns: list[str]) -> pd.DataFrame:
             rows.append(
                 {
                     "formulation": law, "solver": "none", "scenario": f"reach[number={number}]",
-                    "plant": "ideal", "reference": "time", "seed": 0, "status": status,
+                    "plant": "ideal", "reference": "path", "seed": 0, "status": status,
                     "steps": 0 if status == "skipped" else 10,
                     "contour_error_rms_m": recorded, "contour_error_max_m": recorded,
                     "position_error_rms_m": 1.0, "position_error_max_m": 1.0,
+                    "path_done_share": 1.0,
                 }
             )  # fmt: skip
     return pd.DataFrame(rows).assign(**columns)
@@ -57,25 +58,43 @@ def _line(axis: object, label: str) -> np.ndarray:
 def test_failures_and_skips_are_problems_not_solved() -> None:
     """Whatever a failed trial recorded; errors below the least count as equal."""
     trials = _trials({"a": [1e-3, INF, 1e-9], "b": [2e-3, 1e-2, 1e-8], "c": [None, 1e-2, INF]})
-    costs = Costs.of(trials[trials["status"] != "skipped"], "rms")
+    costs = Costs.of(trials[trials["status"] != "skipped"], "rms", late=False)
     assert costs.laws == ["a", "b", "c"]
     assert costs.words == "rms contour error"
     expected = [[1e-3, 2e-3, INF], [INF, 1e-2, 1e-2], [LEAST_ERROR, LEAST_ERROR, INF]]
     np.testing.assert_array_equal(costs.errors, expected)
 
 
+def test_who_stands_still_on_the_path_has_not_followed_it() -> None:
+    """A law that leaves a tenth of the path undone has solved nothing, however near it stayed.
+
+    Where the reference does not wait the distance from the target counts, which grows with the lag;
+    a scenario that has no path (NaN) has nothing to leave undone.
+    """
+    trials = _trials({"goes": [1e-3, 1e-3], "rests": [1e-5, 1e-5]})
+    trials["path_done_share"] = [0.96, np.nan, 0.9, np.nan]
+    on_path = Costs.of(trials, "rms", late=False)
+    np.testing.assert_array_equal(on_path.errors, [[1e-3, INF], [1e-3, LEAST_ERROR]])
+    assert "more than 5% of the path undone" in on_path.undone
+    in_time = Costs.of(trials, "rms", late=True)
+    np.testing.assert_array_equal(in_time.errors, [[1.0, 1.0], [1.0, 1.0]])
+    assert (in_time.words, in_time.undone) == ("rms position error", "")
+
+
 def test_a_problem_without_an_error_to_measure_is_none() -> None:
     """A scenario without a path has no contour; one that nobody survived counts against all."""
     trials = _trials({"a": [1e-3, np.nan, INF], "b": [2e-3, INF, INF]})
-    np.testing.assert_array_equal(Costs.of(trials, "max").errors, [[1e-3, 2e-3], [INF, INF]])
+    np.testing.assert_array_equal(
+        Costs.of(trials, "max", late=False).errors, [[1e-3, 2e-3], [INF, INF]]
+    )
 
 
 def test_older_results_are_compared_by_their_position_error() -> None:
     """Where no contour error was measured."""
     trials = _trials({"a": [1e-3], "b": [2e-3]})
     old = trials.drop(columns=["contour_error_rms_m", "contour_error_max_m"])
-    assert Costs.of(old, "max").words == "largest position error"
-    assert (Costs.of(old, "rms").errors == 1.0).all()
+    assert Costs.of(old, "max", late=False).words == "largest position error"
+    assert (Costs.of(old, "rms", late=False).errors == 1.0).all()
 
 
 def test_the_curves_are_the_profiles(drawn: dict[str, matplotlib.figure.Figure]) -> None:
@@ -92,7 +111,7 @@ def test_the_curves_are_the_profiles(drawn: dict[str, matplotlib.figure.Figure])
         points = _line(whole, law)
         for factor, height in zip((1.0, 1.9, 9.5), heights, strict=True):
             assert np.interp(factor, *points.T) == pytest.approx(height)
-    assert {axis.get_title() for axis in (against_b, against_c)} == {"against b", "against c"}
+    assert {axis.get_title() for axis in (against_b, against_c)} == {"b", "c"}
     data = _line(drawn["data_profiles"].axes[0], "b")
     assert np.interp(5e-3, *data.T) == pytest.approx(2 / 3)
 

@@ -32,6 +32,7 @@ WORST = defaultdict(
     not_verified_share=1.0,
     progress_mean=-INF,
     progress_min=-INF,
+    path_done_share=0.0,
 )
 """What a failed trial counts for: written out here, not read from the metrics."""
 
@@ -91,7 +92,7 @@ def _expected(key: str, rows: Rows, shift: float, times: bool) -> float:
     column = key.removesuffix("_worst")
     values = _defined([_value(row, column, times) for row in rows])
     if key.endswith("_worst"):
-        worst = min if column.startswith("progress") else max
+        worst = min if column.startswith(("progress", "path_done")) else max
         return worst(values) if values else math.nan
     values = [value for value in values if abs(value) != INF]
     if not values:

@@ -27,6 +27,10 @@ NAMED = 8
 PAIRS = 6
 """Laws that are compared with the first one alone."""
 
+DONE = 0.95
+"""A law that leaves more of the path than this undone has not solved the problem: to stand still on
+the path is no way to follow it."""
+
 LARGEST = 1e3
 """Ratio at which performance profiles end."""
 
@@ -50,11 +54,11 @@ def draw_profiles(trials: pd.DataFrame, target: Path) -> list[Figure]:
     ways = [(how(rows), rows) for _, rows in laws.groupby(["plant", "reference"], sort=False)]
     figures: list[Figure] = []
     for name, rows in ways:
-        costs = Costs.of(rows, "rms")
+        costs = Costs.of(rows, "rms", late=bool(rows["reference"].eq("time").all()))
         if costs.comparable:
             file = f"performance_profiles_{len(figures) + 1}"
             figures.append(_performance(costs, name, target, file))
-    errors = {name: Costs.of(rows, "max") for name, rows in ways}
+    errors = {name: Costs.of(rows, "max", late=False) for name, rows in ways}
     errors = {name: costs for name, costs in errors.items() if costs.comparable}
     return [*figures, _data(errors, target)] if errors else figures
 
@@ -68,22 +72,28 @@ class Costs:
         errors: (problems, laws) [m], at least `LEAST_ERROR`; infinite where a law did not solve
             a problem: it failed, or was skipped.
         words: what the errors are.
+        undone: what else counts as not solved, in words.
     """
 
     laws: list[str]
     errors: Array
     words: str
+    undone: str
 
     @classmethod
-    def of(cls, rows: pd.DataFrame, kind: str) -> Costs:
-        """The contour errors of trials, or their position errors where those were not measured.
+    def of(cls, rows: pd.DataFrame, kind: str, *, late: bool) -> Costs:
+        """The errors of trials from their target, or from their path.
 
         Args:
             rows: of one plant and reference mode.
             kind: `rms` or `max`.
+            late: whether being late is an error, as for a reference that does not wait: then the
+                distance from the target counts. Else that from the path does (where it was
+                measured), and who leaves more than `1 - DONE` of the path undone has solved
+                nothing.
         """
         contour = f"contour_error_{kind}_m"
-        is_there = contour in rows and rows[contour].notna().any()
+        is_there = not late and contour in rows and rows[contour].notna().any()
         column = contour if is_there else f"position_error_{kind}_m"
         words = (
             f"{'rms' if kind == 'rms' else 'largest'} {'contour' if is_there else 'position'} error"
@@ -91,12 +101,15 @@ class Costs:
         recorded = rows[column].to_numpy(dtype=float)
         layout = ProblemMatrix.of(rows)
         failed = has_failed(rows)
+        if is_there and "path_done_share" in rows:
+            failed = failed | rows["path_done_share"].lt(DONE).to_numpy()
         errors = layout.fill(np.where(failed, np.nan, np.maximum(recorded, LEAST_ERROR)))
         # A problem that laws went through without an error to measure (no path) is none.
         went_through = layout.fill(np.where(failed, 0.0, 1.0), 0.0).any(axis=1)
         defined = ~np.isnan(errors).all(axis=1) | ~went_through
         solved = np.where(np.isnan(errors), np.inf, errors)[defined]
-        return cls(list(layout.laws["formulation"]), solved, words)
+        undone = f", and those that left more than {1 - DONE:.0%} of the path undone,"
+        return cls(list(layout.laws["formulation"]), solved, words, undone if is_there else "")
 
     @property
     def comparable(self) -> bool:
@@ -121,7 +134,7 @@ def _performance(costs: Costs, name: str, target: Path, file: str) -> Figure:
         for column, number in enumerate((0, place + 1)):
             axis.plot(FACTORS, shares[:, column], **{**look(number), **STEPS, "linewidth": 1.3})
         _factor_axis(axis)
-        axis.set_title(f"against {short(costs.laws[second], 16)}")
+        axis.set_title(short(costs.laws[second], 18))
         axis.tick_params(labelleft=place % 3 == 0, labelbottom=place >= len(others) - 3)
     _factor_axis(whole)
     figure.supxlabel(f"{costs.words} over the smallest of the laws in the picture", fontsize=8)
@@ -129,10 +142,10 @@ def _performance(costs: Costs, name: str, target: Path, file: str) -> Figure:
     caption = (
         f"Performance profiles, {name}: the share of the {len(ratios)} problems (scenarios and "
         f"seeds) on which the {costs.words} of a law is within a factor of the smallest; errors "
-        f"below {LEAST_ERROR:g} m count as equal, failed and skipped trials as not solved. The "
-        f"laws are ordered by the area under their curves{_left_over(order)}. Of many laws a "
-        f"profile ranks the first one only: at the right {costs.laws[first]} with each of the next "
-        f"laws alone.{_flip(costs, order)}"
+        f"below {LEAST_ERROR:g} m count as equal, failed and skipped trials{costs.undone} as not "
+        f"solved. The laws are ordered by the area under their curves{_left_over(order)}. Of many "
+        f"laws a profile ranks the first one only: at the right {costs.laws[first]} with each of the "
+        f"next laws alone, whose name stands above.{_flip(costs, order)}"
     )
     return Figure(save(figure, target, file), caption, f"Performance profiles, {name}")
 
@@ -165,7 +178,8 @@ def _data(errors: dict[str, Costs], target: Path) -> Figure:
     figure.legend(handles, labels, loc="outside upper center", ncols=4)
     caption = (
         "Data profiles: the share of the problems (scenarios and seeds) that a law follows with "
-        "an error below a target all along the way; failed and skipped trials are not solved. A "
+        "an error below a target all along the way; failed and skipped trials"
+        f"{next(iter(errors.values())).undone} are not solved. A "
         "curve does not depend on the other laws. The laws are ordered by their mean height"
         f"{_left_over(ranked)}."
     )

@@ -117,6 +117,7 @@ TRACKING_ERROR = TableKind(
         _average("contour_error_rms_m", "contour rms [m]"),
         _worst("contour_error_max_m", "contour worst [m]"),
         _worst("lag_max_s", "lag worst [s]"),
+        _worst("path_done_share", "path done worst"),
         _average("position_error_rms_m", "position rms [m]"),
         _worst("position_error_max_m", "position worst [m]"),
         _average("orientation_error_rms_rad", "orientation rms [rad]"),

@@ -97,6 +97,26 @@ def on(reference: Reference, delay: float = 0.0, shift: Array | None = None) -> 
     return lambda t: cast(Array, reference.placement(max(t - delay, 0.0)).translation + offset)
 
 
+def test_the_share_of_the_path_that_is_done() -> None:
+    """Of a line of 2 s: 0.5 s late a quarter is left; of two laps at rest from 1.5 s on 5/8 is.
+
+    Shifted sideways all is done; on a way back as long as the way out the half is not the whole.
+    """
+
+    def done(reference: Reference, place: Place) -> float:
+        return evaluate(of(reference, place))["path_done_share"]
+
+    assert done(straight(), on(straight(), 0.5)) == pytest.approx(0.75, abs=1e-6)
+    assert done(straight(), on(straight(), shift=np.array([0, 3e-3, 0]))) == pytest.approx(1.0)
+    rests = on(ROUND)
+    assert done(ROUND, lambda t: rests(min(t, 1.5))) == pytest.approx(3 / 8, abs=1e-4)
+    back = on(back_and_forth())
+    assert done(back_and_forth(), lambda t: back(min(t, 2.0))) == pytest.approx(0.5, abs=1e-4)
+    assert done(back_and_forth(), back) == pytest.approx(1.0, abs=1e-4)
+    turned = of(straight(), on(straight()), tracking=OrientationTask())
+    assert math.isnan(evaluate(turned)["path_done_share"])
+
+
 @pytest.mark.parametrize("reference", [straight(), ROUND, EIGHT], ids=["line", "circle", "eight"])
 @pytest.mark.parametrize("delay", [0.0, 0.1, 0.237])
 def test_a_frame_that_is_late_on_the_path_has_lag_and_no_contour_error(
