@@ -144,8 +144,9 @@ def _performance(costs: Costs, name: str, target: Path, file: str) -> Figure:
         f"seeds) on which the {costs.words} of a law is within a factor of the smallest; errors "
         f"below {LEAST_ERROR:g} m count as equal, failed and skipped trials{costs.undone} as not "
         f"solved. The laws are ordered by the area under their curves{_left_over(order)}. Of many "
-        f"laws a profile ranks the first one only: at the right {costs.laws[first]} with each of the "
-        f"next laws alone, whose name stands above.{_flip(costs, order)}"
+        "laws a profile ranks the first one only: at the right "
+        f"{costs.laws[first]} with each of the next laws alone, whose name stands above."
+        f"{_flip(costs, order)}"
     )
     return Figure(save(figure, target, file), caption, f"Performance profiles, {name}")
 
