@@ -168,7 +168,8 @@ def fail_most(rows: pd.DataFrame, names: Names) -> Finding:
             f"{names.of(most)}: {number(100 * shares.max())} % of the trials{each} "
             f"({ended}: {reasons}).",
         )
-    unanswered = groups[["infeasible_share", "solver_failed_share"]].max().sum(axis=1)
+    of_a_run = rows[["infeasible_share", "solver_failed_share"]].sum(axis=1)
+    unanswered = rows.assign(unanswered=of_a_run).groupby(LAW, sort=False)["unanswered"].max()
     worst = float(unanswered.max())
     if worst <= 0:
         return Finding(question, ALL_ANSWERED)

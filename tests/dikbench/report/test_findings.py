@@ -174,6 +174,9 @@ def test_who_fails_most(make_rows: MakeRows) -> None:
     assert "1 crashed" in text
     rows = make_rows({"a": {"infeasible_share": 0.25}, "b": {}}, THREE)
     assert "No trial failed; `a` had no answer in up to 25 %" in fail_most(rows, Names(rows)).text
+    in_turns = {"infeasible_share": [0.9, 0.0, 0.0], "solver_failed_share": [0.05, 0.8, 0.0]}
+    rows = make_rows({"a": in_turns, "b": {}}, THREE)
+    assert "`a` had no answer in up to 95 %" in fail_most(rows, Names(rows)).text
     rows = make_rows({"b": {}}, THREE)
     assert fail_most(rows, Names(rows)).text == "No trial failed and every step was answered."
 
