@@ -13,7 +13,7 @@ from dikbench.errors import DikbenchError
 from dikbench.metrics import METRICS
 from dikbench.report.sentences.words import several
 from dikbench.run.columns import KEYS, TIMES
-from dikbench.run.exports import MANIFEST, TRIALS, read_manifest, read_trials
+from dikbench.run.exports import MANIFEST, are_exported, read_manifest, read_trials
 from dikbench.run.results import ResultsFolder
 from dikbench.selector import parse_selector
 
@@ -89,7 +89,7 @@ def read_results(path: Path) -> Results:
             if trials.empty:
                 raise DikbenchError(f"no results in {path}: no trial has ended yet")
         except DikbenchError as error:
-            if not (path / TRIALS).is_file():
+            if not are_exported(path):
                 raise
             notes.append(f"Read from trials.csv, for the store cannot be read: {error}.")
         else:

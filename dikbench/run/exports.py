@@ -14,11 +14,17 @@ from dikbench.errors import DikbenchError
 from dikbench.run.columns import KEYS
 
 TRIALS: Final = "trials.csv"
+PARQUET: Final = "trials.parquet"
 MANIFEST: Final = "manifest.json"
 
 TEXT: Final = ("id", *(key for key in KEYS if key != "seed"), "environment", "timing_verdict")
 NEEDED: Final = tuple(name for name in KEYS if name != "message")
 """Columns without which a row says nothing."""
+
+
+def are_exported(folder: Path) -> bool:
+    """Whether a folder holds exported trials: as CSV or, a fifth of it, as Parquet."""
+    return (folder / TRIALS).is_file() or (folder / PARQUET).is_file()
 
 
 def read_trials(folder: Path, notes: list[str]) -> pd.DataFrame:
@@ -31,6 +37,8 @@ def read_trials(folder: Path, notes: list[str]) -> pd.DataFrame:
     Raises:
         DikbenchError: if there are none, or not what a run writes.
     """
+    if not (folder / TRIALS).is_file() and (folder / PARQUET).is_file():
+        return _parquet(folder / PARQUET)
     trials = _rows(folder / TRIALS, notes)
     for name in trials.columns:
         if name not in TEXT:
@@ -53,6 +61,18 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         reason = getattr(error, "strerror", None) or str(error)
         raise DikbenchError(f"{path} cannot be read: {reason}") from None
     return found
+
+
+def _parquet(file: Path) -> pd.DataFrame:
+    try:
+        trials = pd.read_parquet(file)
+    except (OSError, ValueError) as error:  # Arrow's own are among them
+        reason = " ".join(str(error).split())
+        raise DikbenchError(f"{file}: not a table of trials: {reason}") from None
+    for name in NEEDED:
+        if name not in trials:
+            raise DikbenchError(f"{file}: not a table of trials: it has no column {name!r}")
+    return trials
 
 
 def _rows(file: Path, notes: list[str]) -> pd.DataFrame:

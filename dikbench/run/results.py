@@ -12,7 +12,7 @@ import pandas as pd
 from filelock import FileLock, Timeout
 
 from dikbench.errors import DikbenchError
-from dikbench.run.exports import MANIFEST, TRIALS, read_manifest, read_trials
+from dikbench.run.exports import MANIFEST, PARQUET, TRIALS, are_exported, read_manifest, read_trials
 from dikbench.run.store import OtherVersion, Store
 
 
@@ -99,9 +99,7 @@ class ResultsFolder:
             text = json.dumps(store.manifest(), indent=2, ensure_ascii=False) + "\n"
             _replace(self.path / TRIALS, lambda file: trials.to_csv(file, index=False))
             _replace(self.path / "timing.csv", lambda file: times.to_csv(file, index=False))
-            _replace(
-                self.path / "trials.parquet", lambda file: trials.to_parquet(file, index=False)
-            )
+            _replace(self.path / PARQUET, lambda file: trials.to_parquet(file, index=False))
             _replace(self.path / MANIFEST, lambda file: file.write_text(text))
         except OSError as error:
             reason = error.strerror or str(error)
@@ -115,7 +113,7 @@ class ResultsFolder:
         Raises:
             DikbenchError: if the folder holds no results.
         """
-        exported = (self.path / TRIALS).is_file()
+        exported = are_exported(self.path)
         if not exported or self.database.is_file():
             try:
                 with self.open_store() as store:
