@@ -166,7 +166,8 @@ def test_a_store_of_another_version_is_read_through_its_exports(
     database.close()
     whole = dikbench.load_results(folder).trials
     pd.testing.assert_frame_equal(dikbench.load_results(tmp_path).trials, whole)
-    (tmp_path / "trials.csv").unlink()
+    for name in ("trials.csv", "trials.parquet"):
+        (tmp_path / name).unlink()
     with pytest.raises(DikbenchError, match="it lacks 'sigma_min'"):
         dikbench.load_results(tmp_path)
 
