@@ -159,13 +159,16 @@ class Motion:
     @cached_property
     def distances(self) -> Array:
         """Smallest distance that a collision constraint is about, (n + 1,) [m]; else empty."""
-        return self._least([c.distances(self._robot, self.trace.q) for c in self._collisions])
+        return self._least(self._smallest)
 
     @cached_property
     def clearance(self) -> Array:
         """Smallest distance less the margin that its constraint keeps, (n + 1,) [m]; else empty."""
         return self._least(
-            [c.distances(self._robot, self.trace.q) - c.margin for c in self._collisions]
+            [
+                distances - c.margin
+                for distances, c in zip(self._smallest, self._collisions, strict=True)
+            ]
         )
 
     @cached_property
@@ -189,6 +192,11 @@ class Motion:
                 usage: Array = limit.usage(torques).max(axis=1, initial=0.0)
                 return usage
         return np.empty(0)
+
+    @cached_property
+    def _smallest(self) -> list[Array]:
+        """Smallest distance of each collision constraint, (n + 1,) [m] each."""
+        return [c.distances(self._robot, self.trace.q) for c in self._collisions]
 
     @property
     def _robot(self) -> Robot:
