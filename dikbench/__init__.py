@@ -10,17 +10,10 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from dikbench.constraints import CollisionConstraint, Constraint, TorqueConstraint
     from dikbench.errors import DikbenchError, Infeasible, SolverFailed
-    from dikbench.obstacles import BoxObstacle, CapsuleObstacle, SphereObstacle
-    from dikbench.one_step import DikAnswer, solve_dik
-    from dikbench.problem import DikProblem, Formulation, Solve
-    from dikbench.quadratic_program import QuadraticProgram
-    from dikbench.robot import Robot
-    from dikbench.robot_catalogue import load_robot
-    from dikbench.scenario import Scenario
-    from dikbench.status import Status
-    from dikbench.tasks import (
+    from dikbench.problem.constraints import CollisionConstraint, Constraint, TorqueConstraint
+    from dikbench.problem.problem import DikProblem, Formulation, Solve
+    from dikbench.problem.tasks import (
         CentreOfMassTask,
         DampingTask,
         LinearizedTask,
@@ -30,38 +23,45 @@ if TYPE_CHECKING:
         PostureTask,
         Task,
     )
-    from dikbench.tidy import Results, load_results
+    from dikbench.programs.quadratic_program import QuadraticProgram
+    from dikbench.results.frames import Results, load_results
+    from dikbench.robots.catalogue import load_robot
+    from dikbench.robots.collision.obstacles import BoxObstacle, CapsuleObstacle, SphereObstacle
+    from dikbench.robots.robot import Robot
+    from dikbench.scenario.scenario import Scenario
+    from dikbench.simulation.one_step import DikAnswer, solve_dik
+    from dikbench.simulation.status import Status
 
 _HOME = {
-    "BoxObstacle": "obstacles",
-    "CapsuleObstacle": "obstacles",
-    "CentreOfMassTask": "tasks",
-    "CollisionConstraint": "constraints",
-    "Constraint": "constraints",
-    "DampingTask": "tasks",
-    "DikAnswer": "one_step",
+    "BoxObstacle": "robots.collision.obstacles",
+    "CapsuleObstacle": "robots.collision.obstacles",
+    "CentreOfMassTask": "problem.tasks",
+    "CollisionConstraint": "problem.constraints",
+    "Constraint": "problem.constraints",
+    "DampingTask": "problem.tasks",
+    "DikAnswer": "simulation.one_step",
     "DikProblem": "problem",
     "DikbenchError": "errors",
     "Formulation": "problem",
     "Infeasible": "errors",
-    "LinearizedTask": "tasks",
-    "OrientationTask": "tasks",
-    "PoseTask": "tasks",
-    "PositionTask": "tasks",
-    "PostureTask": "tasks",
-    "QuadraticProgram": "quadratic_program",
-    "Results": "tidy",
-    "Robot": "robot",
+    "LinearizedTask": "problem.tasks",
+    "OrientationTask": "problem.tasks",
+    "PoseTask": "problem.tasks",
+    "PositionTask": "problem.tasks",
+    "PostureTask": "problem.tasks",
+    "QuadraticProgram": "programs.quadratic_program",
+    "Results": "results.frames",
+    "Robot": "robots.robot",
     "Scenario": "scenario",
     "Solve": "problem",
     "SolverFailed": "errors",
-    "SphereObstacle": "obstacles",
-    "Status": "status",
-    "Task": "tasks",
-    "TorqueConstraint": "constraints",
-    "load_results": "tidy",
-    "load_robot": "robot_catalogue",
-    "solve_dik": "one_step",
+    "SphereObstacle": "robots.collision.obstacles",
+    "Status": "simulation.status",
+    "Task": "problem.tasks",
+    "TorqueConstraint": "problem.constraints",
+    "load_results": "results.frames",
+    "load_robot": "robots.catalogue",
+    "solve_dik": "simulation.one_step",
 }
 
 __all__ = [

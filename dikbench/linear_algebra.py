@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from scipy.linalg.lapack import dgeqrf, dgesdd, dposv
 
-from dikbench.array import Array
+from dikbench.arrays import Array
 
 Projector = Literal["exact", "damped"]
 

@@ -7,13 +7,18 @@ from typing import ClassVar
 
 import numpy as np
 
-from dikbench.array import Array
-from dikbench.box import Braking
 from dikbench.errors import DikbenchError
-from dikbench.linear_algebra import null_space
-from dikbench.problem import DikProblem, LimitKind, Solve
-from dikbench.quadratic_program import Program, QuadraticProgram
-from dikbench.tasks.task import LinearizedJointTask
+from dikbench.problem import (
+    Array,
+    Braking,
+    DikProblem,
+    LimitKind,
+    LinearizedJointTask,
+    Program,
+    QuadraticProgram,
+    Solve,
+    null_space,
+)
 from formulations.lp_alpha import alpha_program
 from formulations.null_space_program import limits_about
 
@@ -35,7 +40,7 @@ class AlphaTwoStage:
 
     Attributes:
         rank_tolerance: singular values up to this count as zero (absolute, units of J).
-        braking: how the box approaches a position limit (see `dikbench.box`).
+        braking: how the box approaches a position limit (see `dikbench.problem.velocity_box`).
 
     Source: our own; stage 1 is that of [Tedrake], stage 2 the lexicographic order of [Kanoun2011].
     """

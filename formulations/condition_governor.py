@@ -8,11 +8,16 @@ from typing import Literal
 import numpy as np
 import pinocchio as pin
 
-from dikbench.array import Array
 from dikbench.errors import DikbenchError
-from dikbench.linear_algebra import least_norm, thin_svd
-from dikbench.problem import DikProblem, LimitKind, Solve
-from dikbench.robot import Robot
+from dikbench.problem import (
+    Array,
+    DikProblem,
+    LimitKind,
+    Robot,
+    Solve,
+    least_norm,
+    thin_svd,
+)
 from formulations.pseudo_inverse import scaled
 
 

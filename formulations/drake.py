@@ -7,11 +7,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from dikbench.array import Array
 from dikbench.errors import DikbenchError
-from dikbench.problem import DikProblem, LimitKind, Solve
-from dikbench.quadratic_program import Program, QuadraticProgram
-from dikbench.tasks.task import LinearizedJointTask
+from dikbench.problem import (
+    Array,
+    DikProblem,
+    LimitKind,
+    LinearizedJointTask,
+    Program,
+    QuadraticProgram,
+    Solve,
+)
 from formulations.lu_kernel import lu_kernel
 
 REWARD = 100.0

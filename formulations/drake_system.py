@@ -8,11 +8,16 @@ from typing import ClassVar
 import numpy as np
 import pinocchio as pin
 
-from dikbench.array import Array
 from dikbench.errors import DikbenchError
-from dikbench.limits import Limits
-from dikbench.problem import DikProblem, LimitKind, Solve
-from dikbench.quadratic_program import Program, QuadraticProgram
+from dikbench.problem import (
+    Array,
+    DikProblem,
+    LimitKind,
+    Limits,
+    Program,
+    QuadraticProgram,
+    Solve,
+)
 from formulations.drake import angular_first, posture_error
 from formulations.lu_kernel import lu_kernel
 

@@ -7,12 +7,18 @@ from typing import ClassVar
 
 import numpy as np
 
-from dikbench.array import Array
-from dikbench.box import Box, Braking
 from dikbench.errors import DikbenchError, SolverFailed
-from dikbench.linear_algebra import null_space
-from dikbench.problem import DikProblem, LimitKind, Solve
-from dikbench.quadratic_program import Program, QuadraticProgram
+from dikbench.problem import (
+    Array,
+    Box,
+    Braking,
+    DikProblem,
+    LimitKind,
+    Program,
+    QuadraticProgram,
+    Solve,
+    null_space,
+)
 from formulations.null_space_program import limits_about
 
 UNIQUE = 1e-5
@@ -45,7 +51,7 @@ class HierarchicalQp:
     Attributes:
         damping: lambda, unsquared, of the last level.
         rank_tolerance: singular values up to this count as zero (absolute, units of weighted J_k).
-        braking: how the box approaches a position limit (see `dikbench.box`).
+        braking: how the box approaches a position limit (see `dikbench.problem.velocity_box`).
 
     Source: [Kanoun2011]; [Escande2014].
     """

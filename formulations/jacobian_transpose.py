@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dikbench.array import Array
 from dikbench.errors import DikbenchError
-from dikbench.problem import DikProblem, Solve
+from dikbench.problem import Array, DikProblem, Solve
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dikbench.array import Array
 from dikbench.errors import DikbenchError
-from dikbench.limits import Limits
-from dikbench.linear_algebra import DampedInverse, Projector
-from dikbench.problem import DikProblem, Solve
+from dikbench.problem import Array, DampedInverse, DikProblem, Limits, Projector, Solve
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,18 @@ from typing import ClassVar
 
 import numpy as np
 
-from dikbench.array import Array
-from dikbench.box import Box, Braking
 from dikbench.errors import DikbenchError
-from dikbench.problem import DikProblem, LimitKind, Solve
-from dikbench.quadratic_program import Program, QuadraticProgram
-from dikbench.tasks.task import LinearizedTask
+from dikbench.problem import (
+    Array,
+    Box,
+    Braking,
+    DikProblem,
+    LimitKind,
+    LinearizedTask,
+    Program,
+    QuadraticProgram,
+    Solve,
+)
 
 
 @dataclass(frozen=True)
@@ -31,7 +37,7 @@ class LpAlpha:
 
     Attributes:
         regularization: rho; None: 1e-4 if the arm has more joints than the task has rows, else 0.
-        braking: how the box approaches a position limit (see `dikbench.box`).
+        braking: how the box approaches a position limit (see `dikbench.problem.velocity_box`).
 
     Source: [Tedrake], chapter 3.
     """

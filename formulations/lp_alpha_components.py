@@ -8,13 +8,18 @@ from typing import ClassVar
 import numpy as np
 import pinocchio as pin
 
-from dikbench.array import Array
-from dikbench.box import Braking
 from dikbench.errors import DikbenchError, Infeasible
-from dikbench.problem import DikProblem, LimitKind, Solve
-from dikbench.quadratic_program import Program, QuadraticProgram
-from dikbench.tasks.orientation import LinearizedOrientation
-from dikbench.tasks.task import LinearizedTask
+from dikbench.problem import (
+    Array,
+    Braking,
+    DikProblem,
+    LimitKind,
+    LinearizedOrientation,
+    LinearizedTask,
+    Program,
+    QuadraticProgram,
+    Solve,
+)
 from formulations.lp_alpha import regularization_for
 
 UPRIGHT = 1e-3
@@ -36,7 +41,7 @@ class LpAlphaComponents:
 
     Attributes:
         regularization: rho; None: 1e-4 if the arm has more joints than the task has rows, else 0.
-        braking: how the box approaches a position limit (see `dikbench.box`).
+        braking: how the box approaches a position limit (see `dikbench.problem.velocity_box`).
 
     Raises:
         Infeasible: near cos(pitch) = 0, where E has no inverse (that of a position has one); if

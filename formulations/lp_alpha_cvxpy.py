@@ -8,12 +8,16 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from dikbench.array import Array
-from dikbench.box import Braking
 from dikbench.errors import DikbenchError
-from dikbench.modelled_program import ModelledProgram
-from dikbench.problem import DikProblem, LimitKind, Solve
-from dikbench.quadratic_program import Program
+from dikbench.problem import (
+    Array,
+    Braking,
+    DikProblem,
+    LimitKind,
+    ModelledProgram,
+    Program,
+    Solve,
+)
 from formulations.lp_alpha import alpha_program, regularization_for
 
 
@@ -29,7 +33,7 @@ class LpAlphaCvxpy:
 
     Attributes:
         regularization: rho; None: 1e-4 if the arm has more joints than the task has rows, else 0.
-        braking: how the box approaches a position limit (see `dikbench.box`).
+        braking: how the box approaches a position limit (see `dikbench.problem.velocity_box`).
 
     Source: [Tedrake], chapter 3; [DiamondBoyd2016].
     """

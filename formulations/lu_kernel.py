@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dikbench.array import Array
+from dikbench.problem import Array
 
 
 def lu_kernel(A: Array) -> Array:

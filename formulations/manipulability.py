@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dikbench.array import Array
-from dikbench.linear_algebra import thin_svd
+from dikbench.problem import Array, thin_svd
 
 
 def manipulability_gradient(J: Array) -> Array:

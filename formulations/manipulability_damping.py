@@ -6,10 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dikbench.array import Array
 from dikbench.errors import DikbenchError
-from dikbench.linear_algebra import damped_least_squares, volume
-from dikbench.problem import DikProblem, Solve
+from dikbench.problem import Array, DikProblem, Solve, damped_least_squares, volume
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from dikbench.array import Array
 from dikbench.errors import DikbenchError
-from dikbench.limits import Limits
-from dikbench.problem import DikProblem, LimitKind, Solve
-from dikbench.quadratic_program import Program, QuadraticProgram
+from dikbench.problem import (
+    Array,
+    DikProblem,
+    LimitKind,
+    Limits,
+    Program,
+    QuadraticProgram,
+    Solve,
+)
 from formulations.manipulability import manipulability_gradient
 
 LARGEST_SLACK = 10.0

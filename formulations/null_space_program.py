@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dikbench.array import Array
-from dikbench.box import Box
-from dikbench.problem import DikProblem
+from dikbench.problem import Array, Box, DikProblem
 
 
 def limits_about(v: Array, N: Array, box: Box, problem: DikProblem) -> tuple[Array, Array]:

@@ -6,10 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dikbench.array import Array
 from dikbench.errors import DikbenchError
-from dikbench.linear_algebra import DampedInverse, Projector, scaled_identity
-from dikbench.problem import DikProblem, Solve
+from dikbench.problem import (
+    Array,
+    DampedInverse,
+    DikProblem,
+    Projector,
+    Solve,
+    scaled_identity,
+)
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from dikbench.array import Array
 from dikbench.errors import DikbenchError
-from dikbench.limits import Interval
-from dikbench.linear_algebra import least_norm
-from dikbench.problem import DikProblem, LimitKind, Solve
+from dikbench.problem import Array, DikProblem, Interval, LimitKind, Solve, least_norm
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from dikbench.array import Array
 from dikbench.errors import DikbenchError
-from dikbench.linear_algebra import scaled_identity
-from dikbench.problem import DikProblem, LimitKind, Solve
-from dikbench.quadratic_program import Program, QuadraticProgram
+from dikbench.problem import (
+    Array,
+    DikProblem,
+    LimitKind,
+    Program,
+    QuadraticProgram,
+    Solve,
+    scaled_identity,
+)
 
 
 @dataclass(frozen=True)

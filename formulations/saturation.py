@@ -6,12 +6,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dikbench.array import Array
-from dikbench.box import Box
 from dikbench.errors import Infeasible
-from dikbench.linear_algebra import inverse_and_row_space, solve_positive_definite
-from dikbench.problem import DikProblem
-from dikbench.tasks.task import LinearizedTask
+from dikbench.problem import (
+    Array,
+    Box,
+    DikProblem,
+    LinearizedTask,
+    inverse_and_row_space,
+    solve_positive_definite,
+)
 
 FREEDOM = 1e-6
 """Square of the smallest share of a joint's velocity that must be free for it to be saturated:

@@ -8,10 +8,8 @@ from typing import Final, Literal
 
 import numpy as np
 
-from dikbench.array import Array
 from dikbench.errors import DikbenchError
-from dikbench.linear_algebra import rank, thin_svd
-from dikbench.problem import DikProblem, Solve
+from dikbench.problem import Array, DikProblem, Solve, rank, thin_svd
 
 NO_RESPONSE: Final = 1e-10
 """Singular values up to this are skipped, as in the authors' code."""

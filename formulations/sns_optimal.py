@@ -7,10 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from dikbench.array import Array
-from dikbench.box import Braking
 from dikbench.errors import DikbenchError
-from dikbench.problem import DikProblem, LimitKind, Solve
+from dikbench.problem import Array, Braking, DikProblem, LimitKind, Solve
 from formulations.saturation import saturated_levels
 
 
@@ -32,7 +30,7 @@ class OptimalSaturationInNullSpace:
     Weights play no part.
 
     Attributes:
-        braking: how the box approaches a position limit (see `dikbench.box`).
+        braking: how the box approaches a position limit (see `dikbench.problem.velocity_box`).
         rank_tolerance: singular values of J W up to this count as zero (absolute, units of J).
 
     Source: [Flacco2015].

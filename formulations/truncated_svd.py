@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dikbench.array import Array
 from dikbench.errors import DikbenchError
-from dikbench.linear_algebra import rank, thin_svd
-from dikbench.problem import DikProblem, Solve
+from dikbench.problem import Array, DikProblem, Solve, rank, thin_svd
 
 
 @dataclass(frozen=True)

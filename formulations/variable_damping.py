@@ -7,10 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from dikbench.array import Array
 from dikbench.errors import DikbenchError
-from dikbench.linear_algebra import thin_svd
-from dikbench.problem import DikProblem, Solve
+from dikbench.problem import Array, DikProblem, Solve, thin_svd
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,17 @@ from typing import ClassVar
 
 import numpy as np
 
-from dikbench.array import Array
-from dikbench.box import Braking
 from dikbench.errors import DikbenchError
-from dikbench.linear_algebra import scaled_identity
-from dikbench.problem import DikProblem, LimitKind, Solve
-from dikbench.quadratic_program import Program, QuadraticProgram
+from dikbench.problem import (
+    Array,
+    Braking,
+    DikProblem,
+    LimitKind,
+    Program,
+    QuadraticProgram,
+    Solve,
+    scaled_identity,
+)
 
 
 @dataclass(frozen=True)
@@ -31,7 +36,7 @@ class WeightedQp:
     Attributes:
         damping: lambda, unsquared; not zero by default, else the minimiser is not unique on a
             redundant arm.
-        braking: how the box approaches a position limit (see `dikbench.box`).
+        braking: how the box approaches a position limit (see `dikbench.problem.velocity_box`).
         position_gain: share of the distance to a limit per step under `gain` braking.
         log_derivative: whether to multiply tasks by the derivative of their logarithm.
 

@@ -11,20 +11,22 @@ from typing import Any, Literal
 import numpy as np
 import pinocchio as pin
 
-from dikbench.array import Array
-from dikbench.certificate import Certificate, Claim
-from dikbench.oracle import oracle_motion, solve_placement
-from dikbench.references import Reference
-from dikbench.robot_catalogue import load_robot
-from dikbench.scenario import Scenario
-from dikbench.tasks import PoseTask
-from dikbench.variation import Variation
-from scenarios.common import (
+from dikbench.scenario import (
+    Array,
+    Certificate,
+    Claim,
+    PoseTask,
+    Reference,
+    Scenario,
+    Variation,
     limits_in_force,
+    load_robot,
+    oracle_motion,
     placement_of,
     positive,
     samples,
     secondary_tasks,
+    solve_placement,
     start_velocity,
 )
 

@@ -6,19 +6,28 @@ from bisect import bisect_right
 
 import numpy as np
 
-from dikbench.array import Array
-from dikbench.certificate import Certificate, Claim
 from dikbench.errors import DikbenchError
-from dikbench.oracle import measure_motion, solve_placement
-from dikbench.pose_file import PoseFile, read_poses
-from dikbench.references import Reference
-from dikbench.robot import Robot
-from dikbench.robot_catalogue import load_robot
-from dikbench.scenario import Scenario
-from dikbench.tasks import PoseTask
-from dikbench.variation import Variation
-from dikbench.waypoints import through
-from scenarios.common import limits_in_force, positive, samples, secondary_tasks, start_velocity
+from dikbench.scenario import (
+    Array,
+    Certificate,
+    Claim,
+    PoseFile,
+    PoseTask,
+    Reference,
+    Robot,
+    Scenario,
+    Variation,
+    limits_in_force,
+    load_robot,
+    measure_motion,
+    positive,
+    read_poses,
+    samples,
+    secondary_tasks,
+    solve_placement,
+    start_velocity,
+    through,
+)
 
 ROBOTS = ("panda",)
 """On which the example is certified; it takes any."""

@@ -8,15 +8,22 @@ from typing import Literal
 import numpy as np
 import pinocchio as pin
 
-from dikbench.array import Array
-from dikbench.certificate import Certificate, Claim
-from dikbench.oracle import joint_oracle
-from dikbench.references import target_at_rest
-from dikbench.robot_catalogue import load_robot
-from dikbench.scenario import Scenario
-from dikbench.tasks import PoseTask
-from dikbench.variation import Variation
-from scenarios.common import between, limits_in_force, placement_of, positive, samples
+from dikbench.scenario import (
+    Array,
+    Certificate,
+    Claim,
+    PoseTask,
+    Scenario,
+    Variation,
+    between,
+    joint_oracle,
+    limits_in_force,
+    load_robot,
+    placement_of,
+    positive,
+    samples,
+    target_at_rest,
+)
 
 VARIATION = Variation(start=0.2, direction=0.2)
 

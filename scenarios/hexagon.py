@@ -11,25 +11,26 @@ from typing import Literal
 import numpy as np
 import pinocchio as pin
 
-from dikbench.array import Array
-from dikbench.certificate import Certificate, Claim
-from dikbench.curves import plane_of
-from dikbench.oracle import oracle_motion
-from dikbench.references import Reference
-from dikbench.robot import Robot
-from dikbench.robot_catalogue import load_robot
-from dikbench.scenario import Scenario
-from dikbench.tasks import PositionTask
-from dikbench.variation import Variation
-from dikbench.waypoints import through
-from scenarios.common import (
+from dikbench.scenario import (
+    Array,
+    Certificate,
+    Claim,
+    PositionTask,
+    Reference,
+    Robot,
+    Scenario,
+    Variation,
     between,
     limits_in_force,
+    load_robot,
+    oracle_motion,
     placement_of,
+    plane_of,
     positive,
     samples,
     secondary_tasks,
     start_velocity,
+    through,
 )
 
 VARIATION = Variation(start=0.05)

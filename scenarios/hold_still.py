@@ -10,17 +10,24 @@ from typing import Literal
 
 import numpy as np
 
-from dikbench.array import Array
-from dikbench.certificate import Certificate, Claim
 from dikbench.errors import DikbenchError
-from dikbench.oracle import joint_oracle
-from dikbench.references import target_at_rest
-from dikbench.robot import Robot
-from dikbench.robot_catalogue import load_robot
-from dikbench.scenario import Scenario
-from dikbench.tasks import PoseTask
-from dikbench.variation import Variation
-from scenarios.common import limits_in_force, placement_of, positive, samples, secondary_tasks
+from dikbench.scenario import (
+    Array,
+    Certificate,
+    Claim,
+    PoseTask,
+    Robot,
+    Scenario,
+    Variation,
+    joint_oracle,
+    limits_in_force,
+    load_robot,
+    placement_of,
+    positive,
+    samples,
+    secondary_tasks,
+    target_at_rest,
+)
 
 Posture = Literal["start", "singular", "limit"]
 

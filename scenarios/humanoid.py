@@ -8,22 +8,29 @@ from typing import Any, Literal
 import numpy as np
 import pinocchio as pin
 
-from dikbench.array import Array
-from dikbench.certificate import Certificate, Claim
-from dikbench.curves import circle, plane_of
-from dikbench.kinematics import Kinematics, smallest_singular_value
-from dikbench.oracle import OracleMotion, oracle_motion
-from dikbench.robot import Robot
-from dikbench.robot_catalogue import load_robot
-from dikbench.scenario import Scenario
-from dikbench.tasks import CentreOfMassTask, PoseTask, PostureTask, TrackingTogether
-from dikbench.variation import Variation
-from scenarios.common import (
+from dikbench.scenario import (
     POSTURE_WEIGHT,
+    Array,
+    CentreOfMassTask,
+    Certificate,
+    Claim,
+    Kinematics,
+    OracleMotion,
+    PoseTask,
+    PostureTask,
+    Robot,
+    Scenario,
+    TrackingTogether,
+    Variation,
     between,
+    circle,
+    load_robot,
+    oracle_motion,
     placement_of,
+    plane_of,
     positive,
     samples,
+    smallest_singular_value,
     start_velocity,
 )
 

@@ -11,19 +11,20 @@ from typing import Literal
 import numpy as np
 import pinocchio as pin
 
-from dikbench.array import Array
-from dikbench.certificate import Certificate, Claim
 from dikbench.errors import DikbenchError
-from dikbench.oracle import joint_oracle
-from dikbench.references import joint_path
-from dikbench.robot_catalogue import load_robot
-from dikbench.scenario import Scenario
-from dikbench.tasks import PoseTask
-from dikbench.variation import Variation
-from scenarios.common import (
+from dikbench.scenario import (
+    Array,
+    Certificate,
+    Claim,
+    PoseTask,
+    Scenario,
+    Variation,
     between,
+    joint_oracle,
+    joint_path,
     least_norm_share,
     limits_in_force,
+    load_robot,
     positive,
     samples,
     secondary_tasks,

@@ -8,15 +8,21 @@ from typing import Any, Literal
 import numpy as np
 import pinocchio as pin
 
-from dikbench.array import Array
-from dikbench.certificate import Certificate, Claim
-from dikbench.oracle import joint_oracle
-from dikbench.references import Reference
-from dikbench.robot_catalogue import load_robot
-from dikbench.scenario import Scenario
-from dikbench.tasks import PoseTask
-from dikbench.variation import Variation
-from scenarios.common import between, placement_of, positive, samples
+from dikbench.scenario import (
+    Array,
+    Certificate,
+    Claim,
+    PoseTask,
+    Reference,
+    Scenario,
+    Variation,
+    between,
+    joint_oracle,
+    load_robot,
+    placement_of,
+    positive,
+    samples,
+)
 
 VARIATION = Variation(start=0.05, direction=0.5, timing=0.1)
 

@@ -9,29 +9,33 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from dikbench.array import Array
-from dikbench.certificate import Certificate, Claim
 from dikbench.errors import DikbenchError
-from dikbench.oracle import OracleMotion, joint_oracle, oracle_motion, solve_placement
-from dikbench.references import Reference, screw_path
-from dikbench.robot import Robot
-from dikbench.robot_catalogue import load_robot
-from dikbench.scenario import Scenario
-from dikbench.singularity import (
+from dikbench.scenario import (
+    Array,
+    Certificate,
+    Claim,
     Kind,
+    OracleMotion,
+    Perturbation,
+    PoseTask,
+    Reference,
+    Robot,
+    Scenario,
     Singularity,
+    Variation,
     analyse,
-    make_singular,
-    singular_postures,
-)
-from dikbench.tasks import PoseTask
-from dikbench.variation import Perturbation, Variation
-from scenarios.common import (
     between,
+    joint_oracle,
     limits_in_force,
+    load_robot,
+    make_singular,
+    oracle_motion,
     placement_of,
     positive,
+    screw_path,
     secondary_tasks,
+    singular_postures,
+    solve_placement,
     start_velocity,
 )
 from scenarios.singular_postures import SINGULAR_POSTURES, SingularityName, SingularPosture
@@ -77,8 +81,8 @@ def near_miss(
     as speed/miss, while miss = 0 asks for the single joint's own speed. A fold (an elbow) or a
     saddle (shoulder and wrist of a seven-axis arm) is touched along n from the side to which the
     arm bends: X(s) = X_s exp6((miss + |s|) n), and the speed grows as speed/sqrt(miss). See
-    `dikbench.singularity` for how they are told apart. A seed moves the joints of the posture from
-    which q_s is solved by up to 0.1 rad, and changes the speed by up to 10 %.
+    `dikbench.scenario.singularity` for how they are distinguished. A seed moves the joints of the
+    posture from which q_s is solved by up to 0.1 rad, and changes the speed by up to 10 %.
 
     Provokes: joint speeds beyond the limits near a singularity
 

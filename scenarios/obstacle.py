@@ -10,28 +10,35 @@ from typing import Literal
 import numpy as np
 import pinocchio as pin
 
-from dikbench.array import Array
-from dikbench.certificate import Certificate, Claim
-from dikbench.constraints import CollisionConstraint
 from dikbench.errors import DikbenchError
-from dikbench.kinematics import Kinematics
-from dikbench.linear_algebra import null_space
-from dikbench.obstacles import BoxObstacle, CapsuleObstacle, Obstacle, SphereObstacle
-from dikbench.oracle import measure_motion, oracle_motion, solve_placement
-from dikbench.references import Reference, joint_path
-from dikbench.robot import Robot
-from dikbench.robot_catalogue import load_robot
-from dikbench.scenario import Scenario
-from dikbench.tasks import PoseTask
-from dikbench.variation import Variation
-from scenarios.common import (
+from dikbench.scenario import (
+    Array,
+    BoxObstacle,
+    CapsuleObstacle,
+    Certificate,
+    Claim,
+    CollisionConstraint,
+    Kinematics,
+    Obstacle,
+    PoseTask,
+    Reference,
+    Robot,
+    Scenario,
+    SphereObstacle,
+    Variation,
     between,
     duration_at,
     influence_distance,
+    joint_path,
     limits_in_force,
+    load_robot,
+    measure_motion,
+    null_space,
+    oracle_motion,
     positive,
     samples,
     secondary_tasks,
+    solve_placement,
     start_velocity,
 )
 
@@ -105,8 +112,8 @@ def obstacle(
     obstacle is beside the elbow, in the direction in which the null space moves it; a motion that
     does the whole task and stays clear exists, and is measured. A sphere or capsule has the radius
     0.05 m, a cube edges of 0.1 m; a capsule points at the robot. The margin is 0.01 m, from
-    capsules around the links (see `dikbench.collision_bodies`). A seed moves the middle posture by
-    up to 0.03 rad per joint and changes the duration by up to 10 %.
+    capsules around the links (see `dikbench.robots.collision.bodies`). A seed moves the middle
+    posture by up to 0.03 rad per joint and changes the duration by up to 10 %.
 
     Provokes: links that run into what stands in their way
 

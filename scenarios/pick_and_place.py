@@ -7,25 +7,26 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from dikbench.array import Array
-from dikbench.certificate import Certificate, Claim
 from dikbench.errors import DikbenchError
-from dikbench.oracle import oracle_motion
-from dikbench.references import Reference
-from dikbench.robot_catalogue import load_robot
-from dikbench.scenario import Scenario
-from dikbench.tasks import PoseTask
-from dikbench.variation import Variation
-from dikbench.waypoints import through
-from scenarios.common import (
+from dikbench.scenario import (
+    Array,
+    Certificate,
+    Claim,
+    PoseTask,
+    Reference,
+    Scenario,
+    Variation,
     between,
     duration_at,
     limits_in_force,
+    load_robot,
+    oracle_motion,
     placement_of,
     positive,
     samples,
     secondary_tasks,
     start_velocity,
+    through,
 )
 
 ROBOTS = ("panda", "ur3", "ur5", "ur10", "xarm7", "kinova", "tiago")

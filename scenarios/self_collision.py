@@ -10,21 +10,23 @@ from typing import Literal
 import numpy as np
 import pinocchio as pin
 
-from dikbench.array import Array
-from dikbench.certificate import Certificate, Claim
-from dikbench.constraints import CollisionConstraint
-from dikbench.oracle import oracle_motion
-from dikbench.references import Reference, joint_path
-from dikbench.robot import Robot
-from dikbench.robot_catalogue import load_robot
-from dikbench.scenario import Scenario
-from dikbench.tasks import PoseTask
-from dikbench.variation import Variation
-from scenarios.common import (
+from dikbench.scenario import (
+    Array,
+    Certificate,
+    Claim,
+    CollisionConstraint,
+    PoseTask,
+    Reference,
+    Robot,
+    Scenario,
+    Variation,
     between,
     duration_at,
     influence_distance,
+    joint_path,
     limits_in_force,
+    load_robot,
+    oracle_motion,
     positive,
     samples,
     secondary_tasks,
@@ -64,8 +66,8 @@ def self_collision(
 
     The joints move as q(t) = q_0 + sin^2(pi t/T) d and the task frame is asked to follow: the hand
     goes into the base (panda, xarm7, tiago), the upper arm (ur3, ur5, ur10, kinova) or the chest
-    (talos), by more than 0.02 m half way, as the bodies of `dikbench.collision_bodies` measure it;
-    these are capsules around the meshes, so that the true bodies may have some room left. The
+    (talos), by more than 0.02 m half way, as `dikbench.robots.collision.bodies` measures
+    it; these are capsules around the meshes, so that the true bodies may have some room left. The
     margin is 0.01 m. A seed moves the start by up to 0.03 rad per joint and changes the duration by
     up to 10 %.
 

@@ -68,6 +68,6 @@ SINGULAR_POSTURES: Mapping[str, Mapping[SingularityName, SingularPosture]] = Map
 
 UR: q5 = 0, q3 = 0, and the wrist's centre on the cylinder about the first axis. Panda: stretched
 with q5 = 0, q2 = q5 = 0 with q3 = pi/2, and q5 = pi/2 with a q6 that depends on q4. The others were
-found by `dikbench.singularity`; the wrist and shoulder of Talos and the shoulder of TIAGo are
-singular only outside the joints' limits.
+found by `dikbench.scenario.singularity`; the wrist and shoulder of Talos and the shoulder of TIAGo
+are singular only outside the joints' limits.
 """

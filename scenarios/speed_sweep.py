@@ -6,19 +6,22 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Literal
 
-from dikbench.certificate import Certificate, Claim
-from dikbench.curves import circle, lemniscate, plane_of
-from dikbench.oracle import oracle_motion
-from dikbench.references import Reference
-from dikbench.robot_catalogue import load_robot
-from dikbench.scenario import Scenario
-from dikbench.tasks import PoseTask
-from dikbench.variation import Variation
-from scenarios.common import (
+from dikbench.scenario import (
+    Certificate,
+    Claim,
+    PoseTask,
+    Reference,
+    Scenario,
+    Variation,
     between,
+    circle,
     duration_at,
+    lemniscate,
     limits_in_force,
+    load_robot,
+    oracle_motion,
     placement_of,
+    plane_of,
     positive,
     samples,
     secondary_tasks,

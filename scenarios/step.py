@@ -9,20 +9,22 @@ from typing import Literal
 import numpy as np
 import pinocchio as pin
 
-from dikbench.certificate import Certificate, Claim
-from dikbench.oracle import oracle_motion
-from dikbench.references import Reference, target_at_rest
-from dikbench.robot_catalogue import load_robot
-from dikbench.scenario import Scenario
-from dikbench.tasks import PoseTask
-from dikbench.variation import Variation
-from scenarios.common import (
+from dikbench.scenario import (
+    Certificate,
+    Claim,
+    PoseTask,
+    Reference,
+    Scenario,
+    Variation,
     between,
     limits_in_force,
+    load_robot,
+    oracle_motion,
     placement_of,
     positive,
     secondary_tasks,
     start_velocity,
+    target_at_rest,
 )
 
 VARIATION = Variation(start=0.1, direction=0.2)

@@ -11,18 +11,27 @@ from typing import Literal
 import numpy as np
 import pinocchio as pin
 
-from dikbench.array import Array
-from dikbench.certificate import Certificate, Claim
-from dikbench.kinematics import Kinematics
-from dikbench.linear_algebra import damped_least_squares, null_space
-from dikbench.oracle import joint_oracle
-from dikbench.references import joint_path
-from dikbench.robot import Robot
-from dikbench.robot_catalogue import load_robot
-from dikbench.scenario import Scenario
-from dikbench.tasks import PoseTask, PositionTask, TrackingTask
-from dikbench.variation import Variation
-from scenarios.common import between, limits_in_force, positive, samples
+from dikbench.scenario import (
+    Array,
+    Certificate,
+    Claim,
+    Kinematics,
+    PoseTask,
+    PositionTask,
+    Robot,
+    Scenario,
+    TrackingTask,
+    Variation,
+    between,
+    damped_least_squares,
+    joint_oracle,
+    joint_path,
+    limits_in_force,
+    load_robot,
+    null_space,
+    positive,
+    samples,
+)
 
 
 @dataclass(frozen=True)

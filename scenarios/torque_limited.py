@@ -5,26 +5,28 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from dikbench.array import Array
-from dikbench.certificate import Certificate, Claim
-from dikbench.constraints import TorqueConstraint
-from dikbench.constraints.torque import effort_limits
 from dikbench.errors import DikbenchError
-from dikbench.oracle import OracleMotion, oracle_motion
-from dikbench.payload import with_payload
-from dikbench.robot import Robot
-from dikbench.robot_catalogue import load_robot
-from dikbench.scenario import Scenario
-from dikbench.tasks import PoseTask
-from dikbench.variation import Variation
-from dikbench.waypoints import through
-from scenarios.common import (
+from dikbench.scenario import (
+    Array,
+    Certificate,
+    Claim,
+    OracleMotion,
+    PoseTask,
+    Robot,
+    Scenario,
+    TorqueConstraint,
+    Variation,
     between,
+    effort_limits,
     limits_in_force,
+    load_robot,
+    oracle_motion,
     placement_of,
     positive,
     samples,
     secondary_tasks,
+    through,
+    with_payload,
 )
 
 ROBOTS = ("panda", "ur3", "ur5", "ur10", "xarm7", "tiago")

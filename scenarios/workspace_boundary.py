@@ -9,23 +9,27 @@ from typing import Any, Literal
 import numpy as np
 import pinocchio as pin
 
-from dikbench.array import Array
-from dikbench.certificate import Certificate, Claim
 from dikbench.errors import DikbenchError
-from dikbench.oracle import OracleMotion, measure_motion, solve_placement
-from dikbench.references import Reference, target_at_rest
-from dikbench.robot import Robot
-from dikbench.robot_catalogue import load_robot
-from dikbench.scenario import Scenario
-from dikbench.tasks import PoseTask
-from dikbench.variation import Variation
-from scenarios.common import (
+from dikbench.scenario import (
+    Array,
+    Certificate,
+    Claim,
+    OracleMotion,
+    PoseTask,
+    Reference,
+    Robot,
+    Scenario,
+    Variation,
     between,
     limits_in_force,
+    load_robot,
+    measure_motion,
     placement_of,
     positive,
     secondary_tasks,
+    solve_placement,
     start_velocity,
+    target_at_rest,
 )
 
 ROBOTS = ("panda", "ur3", "ur5", "ur10", "xarm7", "kinova", "tiago", "planar3r", "planar4r")

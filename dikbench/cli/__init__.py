@@ -12,7 +12,7 @@ from typing import Any
 import click
 
 from dikbench.cli.one_line_errors import one_line_errors
-from dikbench.cli.results import compare, replay
+from dikbench.cli.reading_commands import compare, replay
 
 SUBJECTS = ("formulations", "scenarios", "solvers", "robots", "metrics", "studies")
 
@@ -105,7 +105,7 @@ def study_options(command: Callable[..., None]) -> Callable[..., None]:
 
 def _selected(study: str | None, axes: dict[str, Any]) -> Any:
     """The study that the options select."""
-    from dikbench.study import DEFAULT_STUDY, Selection, load_study, select
+    from dikbench.study.study import DEFAULT_STUDY, Selection, load_study, select
 
     return select(load_study(study or DEFAULT_STUDY), Selection(**axes), named=study is not None)
 
@@ -163,9 +163,9 @@ def run(
     STUDY is a shipped study (see `dikbench list studies`) or a TOML file; default: quick. Each
     option replaces an axis of the study. The same command continues a run that was stopped.
     """
-    from dikbench.report.page import write_report
+    from dikbench.report.write import write_report
+    from dikbench.run.pool import available_cores
     from dikbench.run.runner import Interrupted, RunSettings, run_study
-    from dikbench.run.workers import available_cores
 
     selected = _selected(study, axes)
     folder = out or Path("runs") / selected.name
@@ -188,7 +188,7 @@ def time(study: str | None, out: Path | None, **axes: Any) -> None:
 
     STUDY and the options are those of `dikbench run`.
     """
-    from dikbench.report.page import write_times
+    from dikbench.report.write import write_times
     from dikbench.run.runner import Interrupted, time_study
 
     selected = _selected(study, axes)
@@ -210,7 +210,7 @@ def report(folder: Path) -> None:
 
     A committed folder, which has trials.csv and manifest.json but no store, will do.
     """
-    from dikbench.report.page import write_report
+    from dikbench.report.write import write_report
 
     click.echo(f"\n{write_report(folder)}\n\n{folder / 'report.html'}")
 
@@ -230,9 +230,9 @@ def recompute(folder: Path, jobs: int | None) -> None:
     For metrics that are new, or were mended, since the run. Trials whose trace was not kept stay as
     they are; the tables and figures are made anew by the next `dikbench run`.
     """
+    from dikbench.run.pool import available_cores
     from dikbench.run.recompute import recompute_results
     from dikbench.run.runner import Interrupted
-    from dikbench.run.workers import available_cores
 
     command = shlex.join(["dikbench", *sys.argv[1:]])
     try:
@@ -261,7 +261,7 @@ def status(folder: Path) -> None:
 @one_line_errors
 def list_(subject: str | None) -> None:
     """List what there is, a line each with its source; all of it without SUBJECT."""
-    from dikbench.listing import listing
+    from dikbench.cli.listing import listing
 
     for name in (subject,) if subject else SUBJECTS:
         if subject is None:
@@ -284,7 +284,7 @@ def show(name: str, figure: Path | None) -> None:
 
     A scenario's selector prints its certificate as well.
     """
-    from dikbench.listing import description
+    from dikbench.cli.listing import description
 
     text = description(name)
     if figure is not None:

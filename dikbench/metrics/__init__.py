@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
+from dikbench.metrics.every import METRICS, evaluate
 from dikbench.metrics.metric import Metric
-from dikbench.metrics.registry import METRICS, evaluate
+from dikbench.metrics.motion import Motion
 
-__all__ = ["METRICS", "Metric", "evaluate"]
+__all__ = ["METRICS", "Metric", "Motion", "evaluate"]

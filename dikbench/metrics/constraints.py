@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from dikbench.metrics.metric import INF, Metric, largest, mean
-from dikbench.motion import Motion
+from dikbench.metrics.motion import Motion
 
 TORQUE_TOLERANCE: Final = 1e-6
 """A torque beyond its limit by less than this share of it is a solver's tolerance."""

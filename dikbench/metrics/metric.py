@@ -8,8 +8,8 @@ from typing import Final, Literal
 
 import numpy as np
 
-from dikbench.array import Array, Mask
-from dikbench.motion import Motion
+from dikbench.arrays import Array, Mask
+from dikbench.metrics.motion import Motion
 
 Table = Literal["tracking error", "limit violation", "smoothness", "solver"]
 

@@ -8,9 +8,9 @@ from typing import Final
 import numpy as np
 import pinocchio as pin
 
-from dikbench.array import Array
+from dikbench.arrays import Array
 from dikbench.metrics.metric import INF, Metric
-from dikbench.motion import Motion
+from dikbench.metrics.motion import Motion
 
 PHASES: Final = 8
 """Configurations are compared at so many phases of a lap."""

@@ -6,10 +6,10 @@ from typing import Final
 
 import numpy as np
 
-from dikbench.array import Array
+from dikbench.arrays import Array
 from dikbench.metrics.metric import INF, NEGLIGIBLE, Metric
+from dikbench.metrics.motion import Motion
 from dikbench.metrics.sparc import sparc
-from dikbench.motion import Motion
 
 DEAD_BAND: Final = 0.1
 """An acceleration below this [rad/s^2] has no sign: rounding does not reverse."""

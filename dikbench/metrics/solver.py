@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dikbench.array import Array, Mask
+from dikbench.arrays import Array, Mask
 from dikbench.metrics.metric import INF, Metric, largest, mean
-from dikbench.motion import Motion
-from dikbench.status import STEP_CODE, Status
-from dikbench.trace import Trace
+from dikbench.metrics.motion import Motion
+from dikbench.simulation.status import STEP_CODE, Status
+from dikbench.simulation.trace import Trace
 
 FELL_BACK = (Status.INFEASIBLE, Status.SOLVER_FAILED)
 """Steps at which the law had no answer and the fallback was applied."""

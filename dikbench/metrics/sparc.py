@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from dikbench.array import Array
+from dikbench.arrays import Array
 
 FASTEST: Final = 10.0
 """Its cut-off [Hz]: a human limb does nothing beyond, a control loop chatters at 50 to 250 Hz."""

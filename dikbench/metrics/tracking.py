@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 from dikbench.metrics.metric import INF, Metric, largest, last, mean, percentile_95, rms
-from dikbench.motion import Motion
-from dikbench.progress import STUCK_PROGRESS, off_course, row_weights
+from dikbench.metrics.motion import Motion
+from dikbench.problem.progress import STUCK_PROGRESS, off_course, row_weights
 
 RECOVERED: Final = 1e-3
 """Below this position error [m] a frame is back at its target."""

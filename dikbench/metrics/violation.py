@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from dikbench.array import Array
+from dikbench.arrays import Array
 from dikbench.metrics.metric import INF, NEGLIGIBLE, Metric, largest, mean
-from dikbench.motion import Motion
+from dikbench.metrics.motion import Motion
 
 
 def _peak_ratio(motion: Motion) -> float:

@@ -13,9 +13,9 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from dikbench.run.workers import THREAD_VARIABLES, available_cores
-from dikbench.solvers.catalogue import BACK_ENDS
-from dikbench.study import Study
+from dikbench.run.pool import THREAD_VARIABLES, available_cores
+from dikbench.solvers.catalogue.back_ends import BACK_ENDS
+from dikbench.study.study import Study
 
 LIBRARIES = (
     "dikbench", "pin", "example-robot-data", "numpy", "scipy", "qpsolvers", "cvxpy", "pandas",

@@ -11,19 +11,19 @@ from pathlib import Path
 from typing import Any
 
 from dikbench.errors import DikbenchError
-from dikbench.identity import trial_id
 from dikbench.metrics import evaluate
-from dikbench.motion import recompute
+from dikbench.metrics.motion import recompute
+from dikbench.results.folder import ResultsFolder
+from dikbench.results.store import Store, StoredTrial
+from dikbench.run.pool import workers
 from dikbench.run.progress_display import ProgressDisplay
 from dikbench.run.provenance import environment, git_commit
-from dikbench.run.results import ResultsFolder
 from dikbench.run.runner import Interrupted
-from dikbench.run.store import Store, StoredTrial
-from dikbench.run.worker import scenario_of
+from dikbench.run.trial_row import scenario_of
 from dikbench.run.worker_process import calm_down
-from dikbench.run.workers import workers
-from dikbench.scenario import Scenario
-from dikbench.trace import Trace
+from dikbench.scenario.scenario import Scenario
+from dikbench.simulation.trace import Trace
+from dikbench.study.identity import trial_id
 
 
 @dataclass(frozen=True)

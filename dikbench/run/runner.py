@@ -15,20 +15,20 @@ import msgspec
 from pebble import ProcessExpired
 
 from dikbench.errors import DikbenchError, unknown
-from dikbench.identity import cell_id
-from dikbench.oracle import ORACLE
-from dikbench.run.columns import CELL
+from dikbench.results.columns import CELL
+from dikbench.results.folder import ResultsFolder
+from dikbench.results.store import Store
+from dikbench.run.pool import end_group, workers
 from dikbench.run.progress_display import ProgressDisplay
 from dikbench.run.provenance import environment, git_commit, manifest
-from dikbench.run.results import ResultsFolder
-from dikbench.run.store import Store
 from dikbench.run.timing import Cell, time_scenario
-from dikbench.run.worker import CannotStore, Row, TracePolicy, row_without_run, work
-from dikbench.run.workers import end_group, workers
+from dikbench.run.trial_row import CannotStore, Row, TracePolicy, row_without_run, work
+from dikbench.scenario.oracle import ORACLE
 from dikbench.selector import parse_selector
-from dikbench.status import Status
-from dikbench.study import PlannedTrial, Study, expand
-from dikbench.trial import Trial
+from dikbench.simulation.status import Status
+from dikbench.study.identity import cell_id
+from dikbench.study.study import PlannedTrial, Study, expand
+from dikbench.study.trial import Trial
 
 TIMING_TIMEOUT: Final = 900.0
 """Wall-clock limit of the timing of one scenario [s]."""

@@ -13,19 +13,19 @@ from typing import Final
 
 import numpy as np
 
-from dikbench.array import Array
-from dikbench.constraints import linearize_all
-from dikbench.control_step import TrialEnded, control_step
-from dikbench.kinematics import Kinematics
-from dikbench.plants import Plant
-from dikbench.problem import DikProblem, Formulation, Solve
-from dikbench.registry import make_formulation
-from dikbench.run.columns import RATES
-from dikbench.run.stability import verdict
-from dikbench.run.worker import Row, scenario_of, solve_of
-from dikbench.scenario import Scenario
-from dikbench.simulation import simulate
-from dikbench.solvers.checked import CheckedSolve, make_solve
+from dikbench.arrays import Array
+from dikbench.plugins.registry import make_formulation
+from dikbench.problem.constraints import linearize_all
+from dikbench.problem.problem import DikProblem, Formulation, Solve
+from dikbench.results.columns import RATES
+from dikbench.robots.kinematics import Kinematics
+from dikbench.run.trial_row import Row, scenario_of, solve_of
+from dikbench.scenario.plant import Plant
+from dikbench.scenario.scenario import Scenario
+from dikbench.simulation.closed_loop import simulate
+from dikbench.simulation.control_step import TrialEnded, control_step
+from dikbench.solvers.checked_solve import CheckedSolve, make_solve
+from dikbench.statistics.stability import verdict
 
 LEAD_IN: Final = 5
 """Problems that are replayed before each timed segment: they bring back what another cell drove out
@@ -76,7 +76,7 @@ def time_scenario(
         rounds: how often each cell solves all of them.
 
     Returns:
-        A row per cell (see `dikbench.run.columns`).
+        A row per cell (see `dikbench.results.columns`).
     """
     scenario = scenario_of(selector, seed)
     segment = record_problems(scenario, make_formulation(reference), problems)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dikbench.array import Array
+from dikbench.arrays import Array
 
 
 def data_profile(errors: Array, targets: Array) -> Array:

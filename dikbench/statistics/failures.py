@@ -19,9 +19,9 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from dikbench.array import Array, Mask
+from dikbench.arrays import Array, Mask
 from dikbench.metrics import METRICS
-from dikbench.status import Status
+from dikbench.simulation.status import Status
 
 SKIPPED = Status.SKIPPED.value
 

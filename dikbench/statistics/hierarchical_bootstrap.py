@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from dikbench.array import Array, Indices
+from dikbench.arrays import Array, Indices
 
 RESAMPLES = 2000
 SEED = 20020101

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dikbench.array import Array
+from dikbench.arrays import Array
 
 
 def performance_ratios(costs: Array) -> Array:

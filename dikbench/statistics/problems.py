@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from dikbench.array import Array, Indices
+from dikbench.arrays import Array, Indices
 
 PROBLEM = ["scenario", "plant", "reference", "seed"]
 LAW = ["formulation", "solver"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dikbench.array import Array
+from dikbench.arrays import Array
 
 
 def shifted_geometric_mean(values: Array, shift: float) -> float:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pinocchio as pin
 from meshcat.animation import Animation
 
-from dikbench.array import Array
+from dikbench.arrays import Array
 from dikbench.viewer.limit_use import Nearness
 from dikbench.viewer.recording import Recording
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from dikbench.status import Status
+from dikbench.simulation.status import Status
 from dikbench.viewer.limit_use import NEAR_SHARE, Nearness
 from dikbench.viewer.recording import Recording
 

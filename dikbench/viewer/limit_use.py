@@ -8,10 +8,10 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from dikbench.array import Array
-from dikbench.limits import JointLimits
+from dikbench.arrays import Array
 from dikbench.metrics.metric import NEGLIGIBLE
-from dikbench.trace import Trace
+from dikbench.robots.limits import JointLimits
+from dikbench.simulation.trace import Trace
 
 NEAR_SHARE: Final = 0.9
 """From this share of a limit on a joint is called near it."""

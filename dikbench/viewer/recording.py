@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from dikbench.errors import DikbenchError
-from dikbench.identity import trial_id
-from dikbench.registry import make_scenario
-from dikbench.run.exports import TRIALS
-from dikbench.run.results import ResultsFolder
-from dikbench.scenario import Scenario
-from dikbench.trace import Trace
-from dikbench.trial import Trial
+from dikbench.plugins.registry import make_scenario
+from dikbench.results.exports import TRIALS
+from dikbench.results.folder import ResultsFolder
+from dikbench.scenario.scenario import Scenario
+from dikbench.simulation.trace import Trace
+from dikbench.study.identity import trial_id
+from dikbench.study.trial import Trial
 
 NAMED: Final = 5
 """So many trials are named where an id is not unique."""

@@ -9,14 +9,14 @@ import numpy as np
 import pinocchio as pin
 from pinocchio.visualize import MeshcatVisualizer
 
-from dikbench.array import Array, Indices
+from dikbench.arrays import Array, Indices
 from dikbench.report.figures.scenario import stick
-from dikbench.robot import Robot
+from dikbench.robots.robot import Robot
 from dikbench.viewer.animation import Moving, animation
-from dikbench.viewer.bodies import bodies
 from dikbench.viewer.legend import COLOURS, WANTED
 from dikbench.viewer.limit_use import Nearness, nearness
 from dikbench.viewer.recording import Recording
+from dikbench.viewer.visuals import bodies
 
 AXES: Final = (0xFF0000, 0x00AA00, 0x0000FF)
 """Colours of x, y, z, as everywhere."""

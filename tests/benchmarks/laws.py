@@ -21,11 +21,11 @@ from time import perf_counter
 
 import numpy as np
 
-from dikbench.array import Array
+from dikbench.arrays import Array
+from dikbench.plugins.registry import make_formulation, make_scenario, plugins
 from dikbench.problem import DikProblem, program_of
-from dikbench.registry import make_formulation, make_scenario, plugins
 from dikbench.run.timing import record_problems
-from dikbench.solvers.checked import make_solve
+from dikbench.solvers.checked_solve import make_solve
 
 SCENARIOS = ("speed-sweep[robot=panda]", "near-miss[robot=ur5,singularity=wrist,miss=0.05]")
 REFERENCE = "dls"

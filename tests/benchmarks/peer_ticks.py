@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from dikbench.robot_data import _data_folder
+from dikbench.robots.example_robot_data import _data_folder
 from dikbench.scenario import Scenario
 
 Tick = Callable[[], int]

@@ -28,22 +28,22 @@ import numpy as np
 import pinocchio as pin
 from peer_ticks import bare_dls_tick, drake_tick, mink_tick, pink_tick
 
-from dikbench.curves import circle
-from dikbench.limits import JointLimits
-from dikbench.planar_arm import planar_arm
-from dikbench.plants import Plant
+from dikbench.plugins.registry import make_formulation, make_scenario
 from dikbench.problem import DikProblem, program_of
-from dikbench.registry import make_formulation, make_scenario
-from dikbench.robot import Robot, model_limits
+from dikbench.problem.tasks import PostureTask
+from dikbench.robots.limits import JointLimits
+from dikbench.robots.planar_arm import planar_arm
+from dikbench.robots.robot import Robot, model_limits
 from dikbench.run.timing import record_problems
-from dikbench.run.worker import run_trial
+from dikbench.run.trial_row import run_trial
 from dikbench.scenario import Scenario
-from dikbench.simulation import simulate
-from dikbench.solvers.catalogue import parse_solver
-from dikbench.solvers.checked import make_solve
-from dikbench.tasks import PostureTask
-from dikbench.trial import Trial
-from scenarios.common import start_velocity
+from dikbench.scenario.building import start_velocity
+from dikbench.scenario.plant import Plant
+from dikbench.scenario.reference.curves import circle
+from dikbench.simulation.closed_loop import simulate
+from dikbench.solvers.catalogue.back_ends import parse_solver
+from dikbench.solvers.checked_solve import make_solve
+from dikbench.study.trial import Trial
 
 SCENARIO = "speed-sweep[robot=panda,speed=0.7,laps=3]"
 WARM = "daqp[interface=warm]"

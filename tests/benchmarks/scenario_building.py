@@ -14,7 +14,7 @@ from statistics import median
 from time import perf_counter
 
 from dikbench.errors import DikbenchError
-from dikbench.registry import Plugin, make_scenario, plugins
+from dikbench.plugins.registry import Plugin, make_scenario, plugins
 
 BUILDS = 5
 

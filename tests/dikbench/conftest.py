@@ -11,10 +11,10 @@ import pandas as pd
 import pytest
 
 from dikbench.metrics import METRICS
-from dikbench.report.page import write_report
-from dikbench.run.columns import KEYS, TIMES
+from dikbench.report.write import write_report
+from dikbench.results.columns import KEYS, TIMES
 from dikbench.run.runner import RunSettings, run_study
-from dikbench.study import Selection, load_study, select
+from dikbench.study.study import Selection, load_study, select
 
 Values = Mapping[str, Any]
 MakeRows = Callable[..., pd.DataFrame]

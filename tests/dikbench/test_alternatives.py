@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from dikbench.errors import DikbenchError
 from dikbench.selector import alternatives, parse_selector
-from dikbench.study import Selection, load_study, select
+from dikbench.study.study import Selection, load_study, select
 
 STUDY = """
 description = "sweeps"

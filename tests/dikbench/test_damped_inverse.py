@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dikbench import load_robot
-from dikbench.array import Array
-from dikbench.contract_states import SINGULAR
-from dikbench.kinematics import Kinematics
+from dikbench.arrays import Array
 from dikbench.linear_algebra import DampedInverse, damped_least_squares, pseudo_inverse
+from dikbench.robots.kinematics import Kinematics
+from dikbench.testing.states import SINGULAR
 
 
 def random_matrix(seed: int, m: int, n: int, rank: int) -> Array:

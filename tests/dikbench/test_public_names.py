@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import dikbench
-from dikbench import tasks
+from dikbench.problem import tasks
 
 
 def test_every_public_name_is_there() -> None:

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dikbench.errors import DikbenchError
-from dikbench.registry import make_formulation, make_scenario
+from dikbench.plugins.registry import make_formulation, make_scenario
 from dikbench.selector import Selector, parse_selector
-from dikbench.solvers.catalogue import BACK_ENDS, parse_solver
+from dikbench.solvers.catalogue.back_ends import BACK_ENDS, parse_solver
 
 # Texts that look like selectors, so that the fuzz gets past the first check.
 pieces = st.sampled_from(

@@ -18,7 +18,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--examples", type=int, default=10_000)
     os.environ["DIKBENCH_FUZZ"] = str(parser.parse_args().examples)
-    tests = Path(__file__).parents[1] / "dikbench" / "test_fuzz.py"
+    tests = Path(__file__).parents[1] / "dikbench" / "cli" / "test_fuzz.py"
     sys.exit(pytest.main(["-q", str(tests)]))
 
 

@@ -21,8 +21,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from dikbench.run.columns import TIMES
-from dikbench.run.results import ResultsFolder
+from dikbench.results.columns import TIMES
+from dikbench.results.folder import ResultsFolder
 
 ARGUMENTS = [
     "run", "--plant", "ideal", "--seed", "0", "--seed", "1", "--seed", "2",

@@ -11,9 +11,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from dikbench.run.results import ResultsFolder
+from dikbench.results.folder import ResultsFolder
 from dikbench.run.runner import RunSettings, run_study
-from dikbench.study import Cells, Study, expand
+from dikbench.study.study import Cells, Study, expand
 
 
 def study_of(trials: int) -> Study:

@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dikbench import DikProblem, LinearizedTask, PostureTask, Robot, load_robot
-from dikbench.array import Array
-from dikbench.contract_states import SINGULAR
-from dikbench.kinematics import Kinematics
-from dikbench.registry import make_formulation
-from dikbench.solvers.checked import make_solve
+from dikbench.arrays import Array
+from dikbench.plugins.registry import make_formulation
+from dikbench.robots.kinematics import Kinematics
+from dikbench.solvers.checked_solve import make_solve
+from dikbench.testing.states import SINGULAR
 
 PLAIN = "condition-governor[after=none]"
 ARMS = ("panda", "ur5", "planar3r")

@@ -10,11 +10,11 @@ from typing import ClassVar, Literal
 import numpy as np
 import pytest
 
-from dikbench.array import Array
+from dikbench.arrays import Array
 from dikbench.errors import DikbenchError, Infeasible
+from dikbench.plugins.registry import make_formulation, plugins
 from dikbench.problem import DikProblem, Formulation, LimitKind, Solve, program_of
-from dikbench.quadratic_program import QuadraticProgram
-from dikbench.registry import make_formulation, plugins
+from dikbench.programs.quadratic_program import QuadraticProgram
 from dikbench.testing import CHECKS, Check, check_formulation
 
 LAWS = sorted(plugins("formulation"))

@@ -22,14 +22,14 @@ from dikbench import (
     load_robot,
     solve_dik,
 )
-from dikbench.array import Array
-from dikbench.kinematics import Kinematics, smallest_singular_value
-from dikbench.planar_arm import planar_arm
+from dikbench.arrays import Array
+from dikbench.plugins.registry import make_formulation
 from dikbench.problem import DikProblem, Formulation
-from dikbench.registry import make_formulation
-from dikbench.robot import model_limits
-from dikbench.solvers.catalogue import BACK_ENDS, is_installed
-from dikbench.solvers.checked import make_solve
+from dikbench.robots.kinematics import Kinematics, smallest_singular_value
+from dikbench.robots.planar_arm import planar_arm
+from dikbench.robots.robot import model_limits
+from dikbench.solvers.catalogue.back_ends import BACK_ENDS, is_installed
+from dikbench.solvers.checked_solve import make_solve
 
 ARMS = ("panda", "ur5", "planar3r")
 TIGHT = {

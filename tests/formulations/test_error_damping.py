@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dikbench import DikProblem, LinearizedTask, QuadraticProgram, load_robot
-from dikbench.array import Array
-from dikbench.registry import make_formulation
-from dikbench.solvers.catalogue import parse_solver
-from dikbench.solvers.checked import make_solve
+from dikbench.arrays import Array
+from dikbench.plugins.registry import make_formulation
+from dikbench.solvers.catalogue.back_ends import parse_solver
+from dikbench.solvers.checked_solve import make_solve
 
 STEPS: list[dict[str, Any]] = json.loads(
     (Path(__file__).parents[1] / "data" / "peers" / "rtb_ik.json").read_text()

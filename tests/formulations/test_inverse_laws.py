@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from dikbench import DikProblem, LinearizedTask, load_robot
-from dikbench.array import Array
-from dikbench.contract_states import SINGULAR
-from dikbench.kinematics import Kinematics
-from dikbench.registry import make_formulation
-from dikbench.solvers.checked import make_solve
+from dikbench.arrays import Array
+from dikbench.plugins.registry import make_formulation
+from dikbench.robots.kinematics import Kinematics
+from dikbench.solvers.checked_solve import make_solve
+from dikbench.testing.states import SINGULAR
 
 SHAPES = ((6, 7), (6, 6), (3, 3), (2, 5), (8, 5))
 SPECTRA = {

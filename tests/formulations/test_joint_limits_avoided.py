@@ -11,14 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dikbench import DikProblem, LinearizedTask, PostureTask, Robot, load_robot
-from dikbench.array import Array
+from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.kinematics import Kinematics, smallest_singular_value
-from dikbench.limits import Limits
-from dikbench.registry import make_formulation
-from dikbench.solvers.checked import make_solve
-from dikbench.tasks import PositionTask
-from dikbench.tasks.posture import middle_posture
+from dikbench.plugins.registry import make_formulation
+from dikbench.problem.tasks import PositionTask
+from dikbench.problem.tasks.posture import middle_posture
+from dikbench.robots.kinematics import Kinematics, smallest_singular_value
+from dikbench.robots.limits import Limits
+from dikbench.solvers.checked_solve import make_solve
 from formulations.weighted_least_norm import mobility
 
 PANDA = load_robot("panda")

@@ -7,10 +7,10 @@ import pinocchio as pin
 import pytest
 
 from dikbench import DikProblem, PoseTask, Robot, load_robot
-from dikbench.array import Array
-from dikbench.kinematics import Kinematics
-from dikbench.solvers.catalogue import parse_solver
-from dikbench.solvers.checked import make_solve
+from dikbench.arrays import Array
+from dikbench.robots.kinematics import Kinematics
+from dikbench.solvers.catalogue.back_ends import parse_solver
+from dikbench.solvers.checked_solve import make_solve
 from formulations.weighted_qp import WeightedQp
 
 WEIGHTS = np.array([1.0, 2.0, 0.5, 0.1, 0.3, 0.05])

@@ -11,14 +11,14 @@ import pinocchio as pin
 import pytest
 
 from dikbench import DikAnswer, Robot, load_robot, solve_dik
-from dikbench.array import Array
-from dikbench.kinematics import Kinematics
+from dikbench.arrays import Array
+from dikbench.plugins.registry import make_formulation
 from dikbench.problem import DikProblem
-from dikbench.quadratic_program import QuadraticProgram
-from dikbench.registry import make_formulation
-from dikbench.solvers.catalogue import parse_solver
-from dikbench.solvers.checked import make_solve
-from dikbench.tasks import LinearizedTask, PoseTask, PostureTask
+from dikbench.problem.tasks import LinearizedTask, PoseTask, PostureTask
+from dikbench.programs.quadratic_program import QuadraticProgram
+from dikbench.robots.kinematics import Kinematics
+from dikbench.solvers.catalogue.back_ends import parse_solver
+from dikbench.solvers.checked_solve import make_solve
 from formulations.drake_system import scaled_bounds
 
 PEERS = Path(__file__).parents[1] / "data" / "peers"

@@ -16,14 +16,14 @@ import pinocchio as pin
 import pytest
 
 from dikbench import DikAnswer, Robot, Status, load_robot, solve_dik
-from dikbench.array import Array
-from dikbench.kinematics import Kinematics
+from dikbench.arrays import Array
+from dikbench.plugins.registry import make_formulation
 from dikbench.problem import DikProblem
-from dikbench.quadratic_program import QuadraticProgram
-from dikbench.registry import make_formulation
-from dikbench.solvers.catalogue import parse_solver
-from dikbench.solvers.checked import make_solve
-from dikbench.tasks import PoseTask, PostureTask
+from dikbench.problem.tasks import PoseTask, PostureTask
+from dikbench.programs.quadratic_program import QuadraticProgram
+from dikbench.robots.kinematics import Kinematics
+from dikbench.solvers.catalogue.back_ends import parse_solver
+from dikbench.solvers.checked_solve import make_solve
 from formulations.lu_kernel import lu_kernel
 
 DT = 0.01

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from dikbench import DikProblem, LinearizedTask, PostureTask, Robot, load_robot
-from dikbench.array import Array
-from dikbench.kinematics import Kinematics, smallest_singular_value
+from dikbench.arrays import Array
+from dikbench.plugins.registry import make_formulation, plugins
 from dikbench.problem import program_of
-from dikbench.registry import make_formulation, plugins
-from dikbench.solvers.catalogue import DEFAULT_SOLVER, parse_solver
-from dikbench.solvers.checked import make_solve
+from dikbench.robots.kinematics import Kinematics, smallest_singular_value
+from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, parse_solver
+from dikbench.solvers.checked_solve import make_solve
 
 PANDA = load_robot("panda")
 STATES = 30

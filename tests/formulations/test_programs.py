@@ -11,18 +11,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from dikbench.array import Array
-from dikbench.contract_states import SINGULAR
+from dikbench.arrays import Array
 from dikbench.errors import DikbenchError, Infeasible, SolverFailed
-from dikbench.kinematics import Kinematics
 from dikbench.linear_algebra import null_space
+from dikbench.plugins.registry import make_formulation
 from dikbench.problem import DikProblem, program_of
-from dikbench.registry import make_formulation
-from dikbench.robot import Robot
-from dikbench.robot_catalogue import load_robot
-from dikbench.solvers.catalogue import parse_solver
-from dikbench.solvers.checked import make_solve
-from dikbench.tasks import LinearizedTask, OrientationTask, PositionTask, PostureTask
+from dikbench.problem.tasks import LinearizedTask, OrientationTask, PositionTask, PostureTask
+from dikbench.robots.catalogue import load_robot
+from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.robot import Robot
+from dikbench.solvers.catalogue.back_ends import parse_solver
+from dikbench.solvers.checked_solve import make_solve
+from dikbench.testing.states import SINGULAR
 from formulations.lp_alpha_components import twist_from_rates
 from formulations.lu_kernel import lu_kernel
 from formulations.manipulability import manipulability_gradient

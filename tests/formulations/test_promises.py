@@ -12,13 +12,13 @@ from hypothesis import HealthCheck, find, given, settings
 from hypothesis import strategies as st
 
 from dikbench import LinearizedTask, PostureTask, load_robot
-from dikbench.array import Array
-from dikbench.box import velocity_box
-from dikbench.contract_states import SINGULAR, State
-from dikbench.kinematics import Kinematics
+from dikbench.arrays import Array
+from dikbench.plugins.registry import make_formulation, plugins
 from dikbench.problem import DikProblem, Formulation, LimitKind, Solve, program_of
-from dikbench.registry import make_formulation, plugins
+from dikbench.problem.velocity_box import velocity_box
+from dikbench.robots.kinematics import Kinematics
 from dikbench.testing import check_state
+from dikbench.testing.states import SINGULAR, State
 
 LAWS = [
     name for name in sorted(plugins("formulation")) if program_of(make_formulation(name)) is None

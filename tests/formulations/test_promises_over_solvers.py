@@ -7,11 +7,11 @@ from functools import cache
 import msgspec
 import pytest
 
-from dikbench.contract_states import State, states
-from dikbench.control_step import control_step
+from dikbench.plugins.registry import make_formulation, plugins
 from dikbench.problem import Formulation, program_of, promises_of
-from dikbench.registry import make_formulation, plugins
-from dikbench.solvers.catalogue import (
+from dikbench.simulation.control_step import control_step
+from dikbench.simulation.status import Status
+from dikbench.solvers.catalogue.back_ends import (
     BACK_ENDS,
     PRESETS,
     Solver,
@@ -19,9 +19,9 @@ from dikbench.solvers.catalogue import (
     parse_solver,
     why_not,
 )
-from dikbench.solvers.checked import make_solve
-from dikbench.status import Status
+from dikbench.solvers.checked_solve import make_solve
 from dikbench.testing import CHECKS, ROUNDING, assert_within
+from dikbench.testing.states import State, states
 
 # What a solver grumbles about is in its answer's status.
 pytestmark = [

@@ -6,9 +6,9 @@ import re
 from pathlib import Path
 
 import formulations
-from dikbench.listing import listing
+from dikbench.cli.listing import listing
 from dikbench.metrics import METRICS
-from dikbench.registry import plugins
+from dikbench.plugins.registry import plugins
 from formulations import FORMULATIONS
 
 FOLDER = Path(formulations.__file__).parent

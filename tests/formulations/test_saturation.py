@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 
 from dikbench import LinearizedTask, Robot, load_robot
-from dikbench.array import Array
-from dikbench.control_step import control_step
+from dikbench.arrays import Array
 from dikbench.errors import Infeasible
-from dikbench.kinematics import Kinematics, smallest_singular_value
-from dikbench.planar_arm import planar_arm
+from dikbench.plugins.registry import make_formulation
 from dikbench.problem import DikProblem, program_of
-from dikbench.quadratic_program import QuadraticProgram
-from dikbench.registry import make_formulation
-from dikbench.robot import model_limits
-from dikbench.solvers.catalogue import parse_solver
-from dikbench.solvers.checked import make_solve
-from dikbench.status import Status
+from dikbench.programs.quadratic_program import QuadraticProgram
+from dikbench.robots.kinematics import Kinematics, smallest_singular_value
+from dikbench.robots.planar_arm import planar_arm
+from dikbench.robots.robot import model_limits
+from dikbench.simulation.control_step import control_step
+from dikbench.simulation.status import Status
+from dikbench.solvers.catalogue.back_ends import parse_solver
+from dikbench.solvers.checked_solve import make_solve
 
 SNS = ("sns", "sns-optimal")
 LP = "lp-alpha[regularization=0]"

@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dikbench import DikProblem, LinearizedTask, load_robot
-from dikbench.array import Array
-from dikbench.registry import make_formulation
-from dikbench.solvers.checked import make_solve
+from dikbench.arrays import Array
+from dikbench.plugins.registry import make_formulation
+from dikbench.solvers.checked_solve import make_solve
 
 STRETCHED = np.array([[0.0, 0.0], [2.0, 1.0]])
 """Position Jacobian of two links of 1 m along x."""

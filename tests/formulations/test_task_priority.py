@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dikbench import DikProblem, LinearizedTask, PostureTask, Robot, load_robot
-from dikbench.array import Array
-from dikbench.kinematics import Kinematics, smallest_singular_value
-from dikbench.registry import make_formulation
-from dikbench.solvers.checked import make_solve
+from dikbench.arrays import Array
+from dikbench.plugins.registry import make_formulation
+from dikbench.robots.kinematics import Kinematics, smallest_singular_value
+from dikbench.solvers.checked_solve import make_solve
 
 PRIORITIES = ("nullspace", "nullspace-robust", "nullspace-unprojected")
 PANDA = load_robot("panda")

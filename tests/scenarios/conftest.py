@@ -7,14 +7,14 @@ from collections.abc import Callable
 import pytest
 
 from dikbench.metrics import evaluate
-from dikbench.motion import recompute
+from dikbench.metrics.motion import recompute
+from dikbench.plugins.registry import make_formulation, make_plant
 from dikbench.problem import program_of
-from dikbench.registry import make_formulation, make_plant
 from dikbench.scenario import Scenario
-from dikbench.simulation import simulate
-from dikbench.solvers.catalogue import parse_solver
-from dikbench.solvers.checked import make_solve
-from dikbench.status import Status
+from dikbench.simulation.closed_loop import simulate
+from dikbench.simulation.status import Status
+from dikbench.solvers.catalogue.back_ends import parse_solver
+from dikbench.solvers.checked_solve import make_solve
 
 Metrics = Callable[..., dict[str, float]]
 

@@ -12,9 +12,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dikbench.errors import DikbenchError
-from dikbench.kinematics import Kinematics
-from dikbench.registry import make_scenario
-from dikbench.robot_catalogue import load_robot
+from dikbench.plugins.registry import make_scenario
+from dikbench.robots.catalogue import load_robot
+from dikbench.robots.kinematics import Kinematics
 from scenarios.back_and_forth import SET_UPS
 
 Metrics = Callable[..., dict[str, float]]

@@ -11,18 +11,18 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from dikbench.array import Array
-from dikbench.certificate import Certificate, Claim
+from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.kinematics import Kinematics
-from dikbench.plants import Plant
-from dikbench.registry import make_scenario, plugins
-from dikbench.robot import Robot
-from dikbench.robot_catalogue import load_robot
+from dikbench.plugins.registry import make_scenario, plugins
+from dikbench.problem.tasks import PostureTask
+from dikbench.robots.catalogue import load_robot
+from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.robot import Robot
 from dikbench.scenario import Scenario
-from dikbench.simulation import simulate
-from dikbench.solvers.checked import make_solve
-from dikbench.tasks import PostureTask
+from dikbench.scenario.certificate import Certificate, Claim
+from dikbench.scenario.plant import Plant
+from dikbench.simulation.closed_loop import simulate
+from dikbench.solvers.checked_solve import make_solve
 from formulations.pseudo_inverse import PseudoInverse
 from scenarios import SCENARIOS
 from scenarios.joint_limit_crossing import CROSSINGS

@@ -11,20 +11,20 @@ from types import MappingProxyType
 import numpy as np
 import pytest
 
-from dikbench.array import Array
-from dikbench.constraints import CollisionConstraint
+from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.kinematics import Kinematics
-from dikbench.motion import recompute
-from dikbench.plants import Plant
+from dikbench.metrics.motion import recompute
+from dikbench.plugins.registry import make_formulation, make_scenario
 from dikbench.problem import program_of
-from dikbench.registry import make_formulation, make_scenario
+from dikbench.problem.constraints import CollisionConstraint
+from dikbench.robots.kinematics import Kinematics
 from dikbench.scenario import Scenario
-from dikbench.simulation import Run, simulate
-from dikbench.solvers.catalogue import parse_solver
-from dikbench.solvers.checked import make_solve
-from dikbench.solvers.warm.warm_solver import WORKSPACES
-from dikbench.status import STEP_CODE, Status
+from dikbench.scenario.plant import Plant
+from dikbench.simulation.closed_loop import Run, simulate
+from dikbench.simulation.status import STEP_CODE, Status
+from dikbench.solvers.catalogue.back_ends import parse_solver
+from dikbench.solvers.checked_solve import make_solve
+from dikbench.solvers.interfaces.warm.warm_solver import WORKSPACES
 
 CASES = [
     "obstacle[robot=panda]",
@@ -146,7 +146,7 @@ def test_rows_that_come_and_go_do_not_break_a_workspace(
     """
     scenario = make_scenario("obstacle[robot=panda,speed=0.6]")
     expected = _run("qp", scenario).trace.q
-    module = importlib.import_module(f"dikbench.solvers.warm.{name}_workspace")
+    module = importlib.import_module(f"dikbench.solvers.interfaces.warm.{name}_workspace")
     made, workspace = [], getattr(module, WORKSPACES[name])
 
     def counted(*given: object) -> object:

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from dikbench.errors import DikbenchError
-from dikbench.kinematics import Kinematics
-from dikbench.registry import make_scenario
-from dikbench.tasks import PositionTask
+from dikbench.plugins.registry import make_scenario
+from dikbench.problem.tasks import PositionTask
+from dikbench.robots.kinematics import Kinematics
 from scenarios.task_conflict import CONFLICTS
 
 Metrics = Callable[..., dict[str, float]]

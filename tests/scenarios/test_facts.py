@@ -7,16 +7,16 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from dikbench.array import Array
-from dikbench.motion import Motion, recompute
-from dikbench.plants import Plant
+from dikbench.arrays import Array
+from dikbench.metrics.motion import Motion, recompute
+from dikbench.plugins.registry import make_formulation, make_scenario
 from dikbench.problem import program_of
-from dikbench.progress import off_course, progress
-from dikbench.registry import make_formulation, make_scenario
-from dikbench.simulation import simulate
-from dikbench.solvers.catalogue import parse_solver
-from dikbench.solvers.checked import make_solve
-from dikbench.status import Status
+from dikbench.problem.progress import off_course, progress
+from dikbench.scenario.plant import Plant
+from dikbench.simulation.closed_loop import simulate
+from dikbench.simulation.status import Status
+from dikbench.solvers.catalogue.back_ends import parse_solver
+from dikbench.solvers.checked_solve import make_solve
 
 WRIST = "near-miss[robot=ur5,singularity=wrist,miss={}]"
 ELBOW = "near-miss[robot=panda,singularity=elbow,miss={}]"

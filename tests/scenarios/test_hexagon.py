@@ -8,12 +8,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from dikbench.array import Array
+from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.kinematics import Kinematics
-from dikbench.registry import make_scenario
-from dikbench.robot import Robot
-from dikbench.robot_catalogue import load_robot
+from dikbench.plugins.registry import make_scenario
+from dikbench.robots.catalogue import load_robot
+from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.robot import Robot
 from dikbench.scenario import Scenario
 
 Metrics = Callable[..., dict[str, float]]

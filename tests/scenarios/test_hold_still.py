@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from dikbench.errors import DikbenchError
-from dikbench.kinematics import Kinematics
-from dikbench.registry import make_scenario
-from dikbench.robot_catalogue import load_robot
+from dikbench.plugins.registry import make_scenario
+from dikbench.robots.catalogue import load_robot
+from dikbench.robots.kinematics import Kinematics
 from scenarios.hold_still import POSTURES, Postures
 
 Metrics = Callable[..., dict[str, float]]

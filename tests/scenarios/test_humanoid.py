@@ -11,18 +11,18 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from dikbench.array import Array
+from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.plants import Plant
+from dikbench.plugins.registry import make_formulation, make_scenario, plugins
 from dikbench.problem import program_of
-from dikbench.registry import make_formulation, make_scenario, plugins
-from dikbench.robot_catalogue import load_robot
+from dikbench.problem.tasks import PoseTask
+from dikbench.robots.catalogue import load_robot
 from dikbench.scenario import Scenario
-from dikbench.simulation import simulate
-from dikbench.solvers.catalogue import DEFAULT_SOLVER, parse_solver
-from dikbench.solvers.checked import make_solve
-from dikbench.status import Status
-from dikbench.tasks import PoseTask
+from dikbench.scenario.plant import Plant
+from dikbench.simulation.closed_loop import simulate
+from dikbench.simulation.status import Status
+from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, parse_solver
+from dikbench.solvers.checked_solve import make_solve
 from scenarios.humanoid import FEET
 
 Metrics = Callable[..., dict[str, float]]

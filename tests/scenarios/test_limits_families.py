@@ -11,14 +11,14 @@ import pinocchio as pin
 import pytest
 
 from dikbench.errors import DikbenchError
-from dikbench.kinematics import Kinematics
 from dikbench.metrics import evaluate
-from dikbench.motion import recompute
-from dikbench.registry import make_plant, make_scenario
-from dikbench.replay import replay_of
-from dikbench.robot_catalogue import load_robot
-from dikbench.simulation import simulate
-from dikbench.solvers.checked import make_solve
+from dikbench.metrics.motion import recompute
+from dikbench.plugins.registry import make_plant, make_scenario
+from dikbench.robots.catalogue import load_robot
+from dikbench.robots.kinematics import Kinematics
+from dikbench.simulation.closed_loop import simulate
+from dikbench.simulation.oracle_law import replay_of
+from dikbench.solvers.checked_solve import make_solve
 from scenarios.joint_limit_crossing import CROSSINGS, Crossing
 from scenarios.start_outside import JOINTS
 

@@ -11,16 +11,16 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from dikbench.array import Array
-from dikbench.certificate import Certificate
+from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.kinematics import Kinematics, smallest_singular_value
-from dikbench.oracle import OracleMotion
-from dikbench.registry import make_scenario
-from dikbench.robot import Robot
-from dikbench.robot_catalogue import load_robot
+from dikbench.plugins.registry import make_scenario
+from dikbench.robots.catalogue import load_robot
+from dikbench.robots.kinematics import Kinematics, smallest_singular_value
+from dikbench.robots.robot import Robot
 from dikbench.scenario import Scenario
-from dikbench.singularity import Singularity, analyse, make_singular
+from dikbench.scenario.certificate import Certificate
+from dikbench.scenario.oracle import OracleMotion
+from dikbench.scenario.singularity import Singularity, analyse, make_singular
 from scenarios.singular_postures import SINGULAR_POSTURES
 
 KNOWN = [(robot, name) for robot, postures in SINGULAR_POSTURES.items() for name in postures]

@@ -11,10 +11,10 @@ import pinocchio as pin
 import pytest
 
 from dikbench.errors import DikbenchError
-from dikbench.kinematics import Kinematics
-from dikbench.oracle import solve_placement
-from dikbench.registry import make_scenario
+from dikbench.plugins.registry import make_scenario
+from dikbench.robots.kinematics import Kinematics
 from dikbench.scenario import Scenario
+from dikbench.scenario.oracle import solve_placement
 from scenarios.step import DIRECTIONS
 
 Metrics = Callable[..., dict[str, float]]

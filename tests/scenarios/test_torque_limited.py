@@ -8,19 +8,19 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from dikbench.array import Array
+from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.plants import Plant
+from dikbench.plugins.registry import make_formulation, make_scenario
 from dikbench.problem import program_of
-from dikbench.registry import make_formulation, make_scenario
-from dikbench.robot import Robot
-from dikbench.robot_catalogue import load_robot
+from dikbench.robots.catalogue import load_robot
+from dikbench.robots.robot import Robot
 from dikbench.scenario import Scenario
-from dikbench.simulation import simulate
-from dikbench.solvers.catalogue import parse_solver
-from dikbench.solvers.checked import make_solve
-from dikbench.status import STEP_CODE, Status
-from dikbench.trace import Trace
+from dikbench.scenario.plant import Plant
+from dikbench.simulation.closed_loop import simulate
+from dikbench.simulation.status import STEP_CODE, Status
+from dikbench.simulation.trace import Trace
+from dikbench.solvers.catalogue.back_ends import parse_solver
+from dikbench.solvers.checked_solve import make_solve
 from scenarios.torque_limited import ROBOTS
 
 

@@ -9,13 +9,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from dikbench.array import Array
+from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.oracle import solve_placement
-from dikbench.registry import make_scenario
-from dikbench.robot import Robot
-from dikbench.robot_catalogue import load_robot
+from dikbench.plugins.registry import make_scenario
+from dikbench.robots.catalogue import load_robot
+from dikbench.robots.robot import Robot
 from dikbench.scenario import Scenario
+from dikbench.scenario.oracle import solve_placement
 from scenarios.workspace_boundary import ROBOTS
 
 Metrics = Callable[..., dict[str, float]]

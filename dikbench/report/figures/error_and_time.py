@@ -7,12 +7,12 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import pandas as pd
 
-from dikbench.report.figures.figure import Figure
-from dikbench.report.figures.labels import label_points
-from dikbench.report.figures.rows import LEAST_ERROR, error_column, how, one_way, with_failures
-from dikbench.report.figures.style import COLOURS, WIDTH, logarithmic, save, short
-from dikbench.run.columns import CELL
-from dikbench.run.stability import STABLE
+from dikbench.report.drawing.figure import Figure
+from dikbench.report.drawing.labels import label_points
+from dikbench.report.drawing.style import COLOURS, WIDTH, logarithmic, save, short
+from dikbench.report.selection.rows import LEAST_ERROR, error_column, how, one_way, with_failures
+from dikbench.results.columns import CELL
+from dikbench.statistics.stability import STABLE
 
 OUTER = 1.8
 """Factor by which the axes go beyond the points: room for names."""

@@ -9,18 +9,18 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
-from dikbench.array import Array
-from dikbench.motion import Motion
-from dikbench.report.figures.figure import Figure
-from dikbench.report.figures.rows import how, one_way
-from dikbench.report.figures.stored_motions import (
+from dikbench.arrays import Array
+from dikbench.metrics.motion import Motion
+from dikbench.report.drawing.figure import Figure
+from dikbench.report.drawing.style import COLOURS, WIDTH, look, save, short
+from dikbench.report.selection.rows import how, one_way
+from dikbench.report.selection.stored_motions import (
     in_panels,
     points_per_curve,
     stored_motions,
     thinned,
 )
-from dikbench.report.figures.style import COLOURS, WIDTH, look, save, short
-from dikbench.run.results import ResultsFolder
+from dikbench.results.folder import ResultsFolder
 from dikbench.selector import parse_selector
 
 FAMILIES: Final = ("joint-limit-crossing", "joint-limit-approach", "start-outside", "hexagon")

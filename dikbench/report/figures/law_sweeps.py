@@ -10,13 +10,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
-from dikbench.report.figures.figure import Figure
-from dikbench.report.figures.rows import LEAST_ERROR, error_column, how, one_way, with_failures
-from dikbench.report.figures.stored_motions import in_panels
-from dikbench.report.figures.style import WIDTH, file_name, logarithmic, look, marker, save, short
-from dikbench.report.figures.sweeps import FEWEST, number
-from dikbench.report.figures.value_scale import ValueScale
-from dikbench.report.tables.make import family
+from dikbench.report.drawing.figure import Figure
+from dikbench.report.drawing.style import WIDTH, file_name, logarithmic, look, marker, save, short
+from dikbench.report.drawing.value_scale import ValueScale
+from dikbench.report.selection.rows import LEAST_ERROR, error_column, how, one_way, with_failures
+from dikbench.report.selection.stored_motions import in_panels
+from dikbench.report.selection.sweeps import FEWEST, number
+from dikbench.report.tables.build import family
 from dikbench.selector import parse_selector
 
 

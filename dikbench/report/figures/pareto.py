@@ -9,11 +9,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
-from dikbench.array import Array, Mask
-from dikbench.report.figures.figure import Figure
-from dikbench.report.figures.labels import label_points
-from dikbench.report.figures.rows import how
-from dikbench.report.figures.style import COLOURS, WIDTH, save, short
+from dikbench.arrays import Array, Mask
+from dikbench.report.drawing.figure import Figure
+from dikbench.report.drawing.labels import label_points
+from dikbench.report.drawing.style import COLOURS, WIDTH, save, short
+from dikbench.report.selection.rows import how
 
 DIGITS: Final = 3
 """After the point, of deg and %; beyond these a law is not better, it is rounded otherwise."""

@@ -14,14 +14,14 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, LogNorm, Normalize, to_rgb
 from matplotlib.patches import Patch
 
-from dikbench.array import Array, Mask
-from dikbench.oracle import ORACLE
-from dikbench.report.figures.figure import Figure
-from dikbench.report.figures.near_miss_grids import NearMissGrid, near_miss_grids
-from dikbench.report.figures.outcomes import OFF_COURSE, OUTCOMES, SLOW, outcomes
-from dikbench.report.figures.panels import place_at_top, small_multiples
-from dikbench.report.figures.rows import error_column, how, pages, with_failures
-from dikbench.report.figures.style import label_decades, save
+from dikbench.arrays import Array, Mask
+from dikbench.report.drawing.figure import Figure
+from dikbench.report.drawing.panels import place_at_top, small_multiples
+from dikbench.report.drawing.style import label_decades, save
+from dikbench.report.selection.near_miss_grids import NearMissGrid, near_miss_grids
+from dikbench.report.selection.outcomes import OFF_COURSE, OUTCOMES, SLOW, outcomes
+from dikbench.report.selection.rows import error_column, how, pages, with_failures
+from dikbench.scenario.oracle import ORACLE
 
 PER_PAGE = 20
 """Laws in one figure."""

@@ -11,11 +11,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
-from dikbench.array import Array
-from dikbench.oracle import ORACLE
-from dikbench.report.figures.figure import Figure
-from dikbench.report.figures.rows import LEAST_ERROR, how, one_solver_each
-from dikbench.report.figures.style import WIDTH, logarithmic, look, save, short
+from dikbench.arrays import Array
+from dikbench.report.drawing.figure import Figure
+from dikbench.report.drawing.style import WIDTH, logarithmic, look, save, short
+from dikbench.report.selection.rows import LEAST_ERROR, how, one_solver_each
+from dikbench.scenario.oracle import ORACLE
 from dikbench.statistics.data_profile import data_profile
 from dikbench.statistics.failures import has_failed, ran
 from dikbench.statistics.performance_profile import area, performance_ratios, profile

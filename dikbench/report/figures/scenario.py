@@ -9,15 +9,15 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pinocchio as pin
 
-from dikbench.array import Array
-from dikbench.constraints import CollisionConstraint
+from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.obstacles import Obstacle
-from dikbench.registry import make_scenario
-from dikbench.report.figures.obstacle_surface import surface
-from dikbench.report.figures.style import COLOURS, style
-from dikbench.robot import Robot
-from dikbench.scenario import Scenario
+from dikbench.plugins.registry import make_scenario
+from dikbench.problem.constraints import CollisionConstraint
+from dikbench.report.drawing.obstacle_surface import surface
+from dikbench.report.drawing.style import COLOURS, style
+from dikbench.robots.collision.obstacles import Obstacle
+from dikbench.robots.robot import Robot
+from dikbench.scenario.scenario import Scenario
 
 FORMATS: Final = (".svg", ".png", ".pdf")
 

@@ -11,12 +11,12 @@ import numpy as np
 import pandas as pd
 from matplotlib import colormaps
 
-from dikbench.report.figures.figure import Figure
-from dikbench.report.figures.panels import small_multiples
-from dikbench.report.figures.rows import LEAST_ERROR, error_column, how, pages, ranked
-from dikbench.report.figures.style import COLOURS, file_name, logarithmic, save, short
-from dikbench.report.figures.sweeps import Sweep, number, sweeps
-from dikbench.report.figures.value_scale import ValueScale
+from dikbench.report.drawing.figure import Figure
+from dikbench.report.drawing.panels import small_multiples
+from dikbench.report.drawing.style import COLOURS, file_name, logarithmic, save, short
+from dikbench.report.drawing.value_scale import ValueScale
+from dikbench.report.selection.rows import LEAST_ERROR, error_column, how, pages, ranked
+from dikbench.report.selection.sweeps import Sweep, number, sweeps
 
 PER_PAGE = 24
 """Laws in one figure."""

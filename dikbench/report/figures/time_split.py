@@ -10,8 +10,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
-from dikbench.report.figures.figure import Figure
-from dikbench.report.figures.style import COLOURS, WIDTH, save, short
+from dikbench.report.drawing.figure import Figure
+from dikbench.report.drawing.style import COLOURS, WIDTH, save, short
 
 PARTS: Final = MappingProxyType(
     {

@@ -15,9 +15,9 @@ from typing import Final
 import jinja2
 from markupsafe import Markup
 
-from dikbench.report.contents import Contents
-from dikbench.report.figures.figure import Figure
-from dikbench.report.pages.spoken import to_html
+from dikbench.report.contents.contents import Contents
+from dikbench.report.drawing.figure import Figure
+from dikbench.report.pages.backticks import to_html
 from dikbench.report.tables.table import Cell, Column, shown
 
 SECTIONS: Final = (

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import jinja2
 
-from dikbench.report.contents import Contents
-from dikbench.report.pages.spoken import to_markdown
+from dikbench.report.contents.contents import Contents
+from dikbench.report.pages.backticks import to_markdown
 from dikbench.report.sentences.words import quoted
 from dikbench.report.tables.markdown import escape, markdown_blocks, markdown_rows
 

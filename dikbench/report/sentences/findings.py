@@ -20,8 +20,8 @@ from dikbench.report.sentences.words import (
     number,
     several,
 )
-from dikbench.run.stability import DRIFT, STABLE
 from dikbench.statistics.problems import LAW
+from dikbench.statistics.stability import DRIFT, STABLE
 
 ON_COURSE: Final = math.radians(1.0)
 """A law that is never farther off course than this stays on it."""

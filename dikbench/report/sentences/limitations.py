@@ -8,15 +8,15 @@ from typing import Any, Final
 
 import pandas as pd
 
-from dikbench.oracle import ORACLE
-from dikbench.plants import DRIVES, REFERENCE_MODES
-from dikbench.registry import plugins
+from dikbench.plugins.registry import plugins
 from dikbench.report.sentences.words import listed, number, quoted, several
-from dikbench.run.stability import STABLE
+from dikbench.scenario.oracle import ORACLE
+from dikbench.scenario.plant import DRIVES, REFERENCE_MODES
 from dikbench.selector import parse_selector
-from dikbench.solvers.catalogue import BACK_ENDS, is_installed
+from dikbench.solvers.catalogue.back_ends import BACK_ENDS, is_installed
 from dikbench.statistics.failures import SKIPPED, has_failed
 from dikbench.statistics.problems import LAW
+from dikbench.statistics.stability import STABLE
 
 WORTH_SAYING: Final = 0.01
 """A share of steps above this is remarked upon."""

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from dikbench.oracle import OracleMotion
-from dikbench.report.sentences.built import built
-from dikbench.scenario import Scenario
+from dikbench.plugins.built_scenarios import built
+from dikbench.scenario.oracle import OracleMotion
+from dikbench.scenario.scenario import Scenario
 
 NEAR_LIMIT: Final = 0.05
 """Nearer to a position limit than this [rad] a motion is at the limit."""

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from dikbench.oracle import ORACLE
 from dikbench.report.sentences.findings import (
     ALL_ANSWERED,
     Finding,
@@ -20,6 +19,7 @@ from dikbench.report.sentences.findings import (
 )
 from dikbench.report.sentences.situations import READING_ORDER, Situation, situation_of
 from dikbench.report.sentences.words import Names, several
+from dikbench.scenario.oracle import ORACLE
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,11 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
-from dikbench.array import Array, Mask
+from dikbench.arrays import Array, Mask
 from dikbench.metrics import METRICS
-from dikbench.oracle import ORACLE
 from dikbench.report.tables.kinds import Quantity, Statistic
 from dikbench.report.tables.table import DIGITS, Cell, Column
+from dikbench.scenario.oracle import ORACLE
 from dikbench.statistics.hierarchical_bootstrap import draw_weights, mean_intervals
 from dikbench.statistics.problems import ProblemMatrix
 from dikbench.statistics.shifted_mean import shift_near_median, shifted_geometric_mean

@@ -8,7 +8,7 @@ from enum import Enum
 from types import MappingProxyType
 
 from dikbench.metrics import METRICS
-from dikbench.run.columns import TIMES
+from dikbench.results.columns import TIMES
 
 
 class Statistic(Enum):
@@ -25,7 +25,7 @@ class Quantity:
     """A column of a table: a column of the trials and what is taken of it.
 
     Attributes:
-        of: column of trials.csv, or of what is derived from it (see `dikbench.report.tables.make`);
+        of: column of trials.csv, or of what is derived from it (see `tables.build`);
             where it is absent (older results), so is the quantity.
         statistic: what is taken over the trials of a row.
         heading: what stands above it.

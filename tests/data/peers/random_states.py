@@ -34,8 +34,8 @@ from pydrake.planning import (
 from pydrake.systems.framework import BusValue
 
 from dikbench import Robot, load_robot
-from dikbench.array import Array
-from dikbench.kinematics import Kinematics
+from dikbench.arrays import Array
+from dikbench.robots.kinematics import Kinematics
 
 HERE = Path(__file__).parent
 sys.path.append(str(HERE.parents[1] / "benchmarks"))

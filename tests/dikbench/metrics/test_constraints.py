@@ -10,18 +10,18 @@ import pinocchio as pin
 import pytest
 
 from dikbench import SphereObstacle
-from dikbench.array import Array
-from dikbench.certificate import Certificate
-from dikbench.constraints import CollisionConstraint, Constraint, TorqueConstraint
+from dikbench.arrays import Array
 from dikbench.metrics import METRICS
 from dikbench.metrics.constraints import CONSTRAINTS
-from dikbench.motion import recompute
-from dikbench.references import target_at_rest
-from dikbench.robot import Robot, model_limits
-from dikbench.robot_catalogue import load_robot
+from dikbench.metrics.motion import recompute
+from dikbench.problem.constraints import CollisionConstraint, Constraint, TorqueConstraint
+from dikbench.problem.tasks import PoseTask
+from dikbench.robots.catalogue import load_robot
+from dikbench.robots.robot import Robot, model_limits
 from dikbench.scenario import Scenario
-from dikbench.tasks import PoseTask
-from dikbench.trace import Trace
+from dikbench.scenario.certificate import Certificate
+from dikbench.scenario.reference.reference import target_at_rest
+from dikbench.simulation.trace import Trace
 
 DT, GRAVITY = 0.1, 9.81
 MASS, LENGTH = 2.0, 0.5

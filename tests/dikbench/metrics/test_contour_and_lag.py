@@ -11,17 +11,17 @@ import pinocchio as pin
 import pytest
 from scipy.optimize import minimize_scalar
 
-from dikbench.array import Array
-from dikbench.certificate import Certificate
-from dikbench.curves import circle, lemniscate
+from dikbench.arrays import Array
 from dikbench.metrics import evaluate
-from dikbench.motion import Motion
-from dikbench.path import Path, path_of
-from dikbench.references import Reference, target_at_rest
-from dikbench.robot_catalogue import load_robot
+from dikbench.metrics.motion import Motion
+from dikbench.problem.tasks import OrientationTask, PoseTask
+from dikbench.robots.catalogue import load_robot
 from dikbench.scenario import Scenario
-from dikbench.tasks import OrientationTask, PoseTask
-from dikbench.trace import Trace
+from dikbench.scenario.certificate import Certificate
+from dikbench.scenario.reference.curves import circle, lemniscate
+from dikbench.scenario.reference.path import Path, path_of
+from dikbench.scenario.reference.reference import Reference, target_at_rest
+from dikbench.simulation.trace import Trace
 
 DT = 0.01
 ROBOT = load_robot("panda")

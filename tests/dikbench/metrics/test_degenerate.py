@@ -14,14 +14,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dikbench.metrics import METRICS, evaluate
-from dikbench.motion import recompute
-from dikbench.references import target_at_rest
-from dikbench.registry import make_scenario
+from dikbench.metrics.motion import recompute
+from dikbench.plugins.registry import make_scenario
+from dikbench.problem.tasks import OrientationTask, PositionTask
 from dikbench.scenario import Scenario
-from dikbench.simulation import FASTEST
-from dikbench.status import STEP_STATUSES
-from dikbench.tasks import OrientationTask, PositionTask
-from dikbench.trace import Trace
+from dikbench.scenario.reference.reference import target_at_rest
+from dikbench.simulation.closed_loop import FASTEST
+from dikbench.simulation.status import STEP_STATUSES
+from dikbench.simulation.trace import Trace
 
 
 @cache

@@ -9,16 +9,16 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from dikbench.array import Array
-from dikbench.curves import circle
+from dikbench.arrays import Array
 from dikbench.metrics import METRICS
-from dikbench.motion import Motion, recompute
-from dikbench.plants import Plant
-from dikbench.registry import make_formulation, make_scenario
+from dikbench.metrics.motion import Motion, recompute
+from dikbench.plugins.registry import make_formulation, make_scenario
 from dikbench.scenario import Scenario
-from dikbench.simulation import simulate
-from dikbench.solvers.checked import make_solve
-from dikbench.trace import Trace
+from dikbench.scenario.plant import Plant
+from dikbench.scenario.reference.curves import circle
+from dikbench.simulation.closed_loop import simulate
+from dikbench.simulation.trace import Trace
+from dikbench.solvers.checked_solve import make_solve
 
 SWEEP = make_scenario("speed-sweep[robot=panda,speed=0.3,laps=3]")
 

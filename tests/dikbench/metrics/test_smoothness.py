@@ -7,16 +7,16 @@ import math
 import numpy as np
 import pytest
 
-from dikbench.array import Array
-from dikbench.certificate import Certificate
+from dikbench.arrays import Array
 from dikbench.metrics import METRICS
+from dikbench.metrics.motion import Motion
 from dikbench.metrics.sparc import sparc
-from dikbench.motion import Motion
-from dikbench.references import target_at_rest
-from dikbench.robot_catalogue import load_robot
+from dikbench.problem.tasks import PoseTask
+from dikbench.robots.catalogue import load_robot
 from dikbench.scenario import Scenario
-from dikbench.tasks import PoseTask
-from dikbench.trace import Trace
+from dikbench.scenario.certificate import Certificate
+from dikbench.scenario.reference.reference import target_at_rest
+from dikbench.simulation.trace import Trace
 
 ROBOT = load_robot("planar3r")
 

@@ -11,8 +11,8 @@ import pandas as pd
 import pytest
 
 from dikbench.metrics import METRICS
-from dikbench.report.figures import style as style_module
-from dikbench.run.columns import RATES, TIMES
+from dikbench.report.drawing import style as style_module
+from dikbench.results.columns import RATES, TIMES
 
 MakeTrials = Callable[..., pd.DataFrame]
 

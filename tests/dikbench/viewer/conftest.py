@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from dikbench.run.runner import RunSettings, run_study
-from dikbench.study import Cells, Study
+from dikbench.study.study import Cells, Study
 
 STUDY = Study(
     description="an arm with meshes and one without, a fast law, a step without a path",

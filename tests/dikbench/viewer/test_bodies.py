@@ -10,9 +10,9 @@ import pinocchio as pin
 import pytest
 
 from dikbench.report.figures.scenario import stick
-from dikbench.robot_catalogue import ROBOTS, load_robot
-from dikbench.robot_data import DataModel
-from dikbench.viewer.bodies import bodies, capsules
+from dikbench.robots.catalogue import ROBOTS, load_robot
+from dikbench.robots.example_robot_data import DataModel
+from dikbench.viewer.visuals import bodies, capsules
 
 ARM = """<robot name="arm">
   <link name="base"/>

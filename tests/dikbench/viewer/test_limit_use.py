@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from dikbench.array import Array
+from dikbench.arrays import Array
 from dikbench.metrics import METRICS
-from dikbench.motion import recompute
-from dikbench.registry import make_scenario
-from dikbench.robot_catalogue import load_robot
-from dikbench.trace import Trace
+from dikbench.metrics.motion import recompute
+from dikbench.plugins.registry import make_scenario
+from dikbench.robots.catalogue import load_robot
+from dikbench.simulation.trace import Trace
 from dikbench.viewer.limit_use import Nearness, nearness
 
 INSIDE, NEAR, PAST = Nearness

@@ -17,9 +17,9 @@ import pinocchio as pin
 import pytest
 from click.testing import CliRunner, Result
 
-from dikbench.array import Array
+from dikbench.arrays import Array
 from dikbench.cli import commands
-from dikbench.robot import Robot
+from dikbench.robots.robot import Robot
 from dikbench.viewer.limit_use import nearness
 from dikbench.viewer.recording import Recording, find_recording
 
@@ -129,7 +129,7 @@ def test_tool_and_target_move_as_they_did(pages: dict[str, str], runs: Path, fam
 
 def test_bodies_move_with_their_joints(pages: dict[str, str], runs: Path) -> None:
     """Every mesh of the arm has keyframes, and the last one is where its joint was at the end."""
-    from dikbench.viewer.bodies import bodies
+    from dikbench.viewer.visuals import bodies
 
     recording = recording_of(runs, "reach")
     robot, moving = recording.scenario.robot, tracks(pages["reach"])[0]

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from dikbench.errors import DikbenchError
-from dikbench.run.results import ResultsFolder
-from dikbench.trace import Trace
+from dikbench.results.folder import ResultsFolder
+from dikbench.simulation.trace import Trace
 from dikbench.viewer.recording import find_recording, newest_results
 
 

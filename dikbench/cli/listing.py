@@ -1,0 +1,191 @@
+"""What there is, in lines and in full."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from dikbench.errors import unknown
+from dikbench.metrics import METRICS
+from dikbench.plugins.registry import Plugin, formulation_plugin, make_scenario, plugins
+from dikbench.robots.catalogue import ROBOTS, load_robot
+from dikbench.scenario.oracle import ORACLE
+from dikbench.selector import parse_selector
+from dikbench.solvers.catalogue.back_ends import BACK_ENDS, is_installed
+from dikbench.solvers.catalogue.presets import TOLERANCES
+from dikbench.study.study import load_study, shipped_studies
+
+
+def listing(subject: str) -> list[str]:
+    """A line for each thing of a kind: name, what it is, source."""
+    return _aligned(_SUBJECTS[subject]())
+
+
+def _aligned(rows: list[tuple[str, str, str]]) -> list[str]:
+    width = max(len(name) for name, _, _ in rows)
+    return [
+        f"{name:<{width}}  {summary} {_bracketed(source)}".rstrip()
+        for name, summary, source in rows
+    ]
+
+
+def _bracketed(source: str) -> str:
+    """A source in brackets; the keys of the references page bring their own."""
+    return f"[{source}]" if source and "[" not in source else source
+
+
+def _formulations() -> list[tuple[str, str, str]]:
+    laws = plugins("formulation").values()
+    summary = "Not a law: the joint motion from which a scenario's path was built, scored like one"
+    return [
+        *((law.name, law.summary.rstrip("."), law.source) for law in laws),
+        (ORACLE, summary, ""),
+    ]
+
+
+def _scenarios() -> list[tuple[str, str, str]]:
+    """What each family provokes and which metrics show it; its summary where it does not say."""
+    return [
+        (f.name, f.paragraph("Provokes") or f.summary.rstrip("."), f.paragraph("Shows in"))
+        for f in plugins("scenario").values()
+    ]
+
+
+def _solvers() -> list[tuple[str, str, str]]:
+    return [
+        (name, entry.summary, "" if is_installed(name) else "not installed")
+        for name, entry in BACK_ENDS.items()
+    ]
+
+
+def _metrics() -> list[tuple[str, str, str]]:
+    return [
+        (m.name, m.definition, "lower is better" if m.best == "low" else "higher is better")
+        for m in METRICS.values()
+    ]
+
+
+_SUBJECTS: Mapping[str, Callable[[], list[tuple[str, str, str]]]] = {
+    "formulations": _formulations,
+    "scenarios": _scenarios,
+    "solvers": _solvers,
+    "robots": lambda: [(name, entry.summary, "") for name, entry in ROBOTS.items()],
+    "metrics": _metrics,
+    "studies": lambda: [(n, load_study(n).description, "") for n in shipped_studies()],
+}
+
+
+def description(text: str) -> str:
+    """One thing in full.
+
+    Raises:
+        DikbenchError: if nothing has this name, or a parameter of it is wrong.
+    """
+    selector = parse_selector(text)
+    name = selector.name
+    if name == ORACLE:
+        return f"{ORACLE}: {_formulations()[-1][1]}"
+    if name in plugins("formulation") or ".py:" in name:
+        return _plugin(formulation_plugin(name))
+    if name in plugins("scenario"):
+        return "\n".join([_plugin(plugins("scenario")[name]), "", *_difficulty(text)])
+    if name in BACK_ENDS:
+        return _solver(name)
+    if name in ROBOTS:
+        return _robot(name)
+    if name in METRICS:
+        return _metric(name)
+    if name in shipped_studies() or name.endswith(".toml"):
+        study = load_study(name)
+        path = shipped_studies().get(name, name)
+        return f"# {study.name} ({path})\n\n{Path(path).read_text(encoding='utf-8')}"
+    every = [*plugins("formulation"), *plugins("scenario"), *BACK_ENDS, *ROBOTS, *METRICS]
+    raise unknown("name", name, [*every, *shipped_studies()])
+
+
+def _plugin(plugin: Plugin) -> str:
+    parameters = [
+        f"  {p.name}: {p.annotation}" + ("" if p.default is p.empty else f" = {p.default}")
+        for p in plugin.parameters.values()
+    ]
+    return "\n".join(
+        [
+            f"{plugin.name} ({plugin.file})",
+            "",
+            inspect.getdoc(plugin.documented) or "",
+            "",
+            "Parameters:",
+            *(parameters or ["  none"]),
+        ]
+    )
+
+
+def _difficulty(text: str) -> list[str]:
+    """The certificate of a scenario, and what its own joint motion asks of the robot."""
+    scenario = make_scenario(text)
+    lines = [f"Certificate of {text}:", *(f"  {claim}" for claim in scenario.certificate.claims)]
+    motion = scenario.motion
+    if motion is None:
+        lines += ["", "No joint motion does what it asks for."]
+    else:
+        sigma, margin, reach = motion.sigma_min, motion.margin, motion.reach
+        lines += [
+            "",
+            f"The joint motion that does it, in {len(motion.instants)} samples "
+            f"({scenario.duration:.4g} s, {scenario.steps} control steps):",
+            f"  smallest singular value (m, rad): {sigma.min():.4g} to {sigma.max():.4g}",
+            f"  margin to the position limits [rad]: {margin.min():.4g} to {margin.max():.4g}",
+            f"  required speed over limit: up to {motion.peak_speed_ratio:.4g}",
+            f"  reach from the first joint [m]: {reach.min():.4g} to {reach.max():.4g}",
+        ]
+    return [*lines, "", f"A seed perturbs: {scenario.variation}."]
+
+
+def _solver(name: str) -> str:
+    entry = BACK_ENDS[name]
+    presets = ", ".join(f"{preset} {tolerance:g}" for preset, tolerance in TOLERANCES.items())
+    settings = ", ".join(f"{key} ({kind.__name__})" for key, kind in entry.settings.items())
+    return "\n".join(
+        [
+            f"{name}: {entry.summary}",
+            f"  package: {entry.distribution}, {'installed' if is_installed(name) else 'missing'}",
+            f"  interfaces: {', '.join(entry.interfaces)} (the first is the default)",
+            f"  linear programs: {entry.no_lp or 'yes'}",
+            f"  presets: {presets} (largest residual of a verified answer)",
+            f"  settings: {settings or 'none'}",
+        ]
+    )
+
+
+def _robot(name: str) -> str:
+    entry, robot = ROBOTS[name], load_robot(name)
+    limits = robot.limits
+    lines = [
+        f"{name}: {entry.summary}",
+        f"  task frame: {robot.frame}; {robot.nv} velocities",
+        f"  safe start [rad]: {np.round(robot.q0, 4).tolist()}",
+    ]
+    if limits.position is not None:
+        lines += [f"  position [rad]: {limits.position.lower.tolist()} to"]
+        lines += [f"                  {limits.position.upper.tolist()}"]
+    if limits.velocity is not None:
+        lines.append(f"  velocity [rad/s]: {limits.velocity.upper.tolist()}")
+    if robot.available_acceleration is not None:
+        acceleration = robot.available_acceleration.tolist()
+        lines.append(f"  acceleration [rad/s^2]: {acceleration} ({entry.acceleration_source})")
+    return "\n".join(lines)
+
+
+def _metric(name: str) -> str:
+    metric = METRICS[name]
+    return "\n".join(
+        [
+            f"{name}: {metric.definition}",
+            f"  unit: {metric.unit or 'none'}; best {metric.best}; worst value {metric.worst}",
+            f"  table: {metric.table}",
+            f"  source: {metric.source.strip('[]')}",
+        ]
+    )

@@ -1,0 +1,46 @@
+"""Every metric, and a motion by all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import numpy as np
+
+from dikbench.metrics.constraints import CONSTRAINTS
+from dikbench.metrics.contour import CONTOUR
+from dikbench.metrics.metric import Metric
+from dikbench.metrics.motion import Motion
+from dikbench.metrics.null_space_drift import NULL_SPACE_DRIFT
+from dikbench.metrics.smoothness import SMOOTHNESS
+from dikbench.metrics.solver import SOLVER
+from dikbench.metrics.tracking import TRACKING
+from dikbench.metrics.violation import VIOLATION
+
+METRICS: Mapping[str, Metric] = MappingProxyType(
+    {
+        metric.name: metric
+        for metric in (
+            *TRACKING,
+            *CONTOUR,
+            *NULL_SPACE_DRIFT,
+            *VIOLATION,
+            *CONSTRAINTS,
+            *SMOOTHNESS,
+            *SOLVER,
+        )
+    }
+)
+"""Every metric by its name, in the order of the columns."""
+
+
+def evaluate(motion: Motion) -> dict[str, float]:
+    """Every metric of a motion, by name.
+
+    A motion that is not finite came to nothing: each metric has its worst value.
+    """
+    trace = motion.trace
+    recorded = (trace.q, trace.tau, trace.wanted, trace.applied)
+    if not all(np.isfinite(part).all() for part in recorded):
+        return {name: metric.worst for name, metric in METRICS.items()}
+    return {name: metric.of(motion) for name, metric in METRICS.items()}

@@ -1,0 +1,1 @@
+"""Plug-ins: found through entry points or files, built from selectors."""

@@ -1,0 +1,94 @@
+"""The source that a plug-in is made of: its own file, and what it shares with others."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import importlib.util
+import sys
+from functools import lru_cache
+from pathlib import Path
+from typing import Final
+
+from dikbench.plugins.registry import Plugin
+
+SHARING: Final = ("formulations", "scenarios")
+"""Packages whose modules count wherever they are imported; those of a plug-in's own package do too.
+The harness does not: it is in the version."""
+
+
+def source_digest(plugin: Plugin) -> str:
+    """A hash of the source of a plug-in, 16 hexadecimal digits.
+
+    Of its own file and of the modules of its package that it imports, directly or through others:
+    laws that share a module change with it, and no other law does.
+    """
+    module = plugin.documented.__module__
+    packages = frozenset({*SHARING, module.partition(".")[0]})
+    files: dict[str, str] = {module: plugin.file}
+    waiting = [module]
+    while waiting:
+        name = waiting.pop()
+        for imported in _imported(files[name], name, packages) - files.keys():
+            files[imported] = _file(imported)
+            waiting.append(imported)
+    return digest("\n".join(f"{name} {digest_of_file(files[name])}" for name in sorted(files)))
+
+
+@lru_cache(maxsize=256)
+def digest_of_file(file: str) -> str:
+    """A hash of what a file holds; empty where there is none (a class made at a prompt)."""
+    try:
+        return digest(Path(file).read_bytes().decode(errors="replace"))
+    except OSError:
+        return ""
+
+
+def digest(text: str) -> str:
+    """A hash of a text, 16 hexadecimal digits."""
+    return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
+
+
+@lru_cache(maxsize=1024)
+def _imported(file: str, module: str, packages: frozenset[str]) -> frozenset[str]:
+    """The modules of some packages that a file imports, wherever in it, as the module `module`."""
+    try:
+        tree = ast.parse(Path(file).read_bytes())
+    except (OSError, SyntaxError, ValueError):  # no file, or none of Python's
+        return frozenset()
+    found: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names = [(alias.name, "") for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            names = [(_base(node, file, module), alias.name) for alias in node.names]
+        else:
+            continue
+        for base, name in names:
+            if base.partition(".")[0] in packages:  # others are not looked for: that imports them
+                inner = f"{base}.{name}"
+                found.add(inner if name and _file(inner) else base)
+    return frozenset(found)
+
+
+def _base(node: ast.ImportFrom, file: str, module: str) -> str:
+    """The module from which an import takes names, without the dots of a relative one."""
+    if not node.level:
+        return node.module or ""
+    parts = module.split(".")
+    up = node.level - (Path(file).name == "__init__.py")
+    parents = parts[: len(parts) - up]
+    return ".".join([*parents, node.module] if node.module else parents)
+
+
+@lru_cache(maxsize=1024)
+def _file(module: str) -> str:
+    """The file of a module; empty where it has none or is none."""
+    loaded = sys.modules.get(module)
+    if loaded is not None:
+        return getattr(loaded, "__file__", None) or ""
+    try:
+        spec = importlib.util.find_spec(module)
+    except (ImportError, AttributeError, ValueError):  # its parent is no package
+        return ""
+    return (spec.origin or "") if spec is not None and spec.has_location else ""

@@ -1,0 +1,105 @@
+"""One control step, and all that the author of a formulation imports.
+
+The problem and its parts (tasks, limits, the velocity box, rows G v <= h), the programs that a
+solver is handed, and linear algebra.
+"""
+
+from __future__ import annotations
+
+from dikbench.arrays import Array, Mask
+from dikbench.linear_algebra import (
+    DampedInverse,
+    Projector,
+    damped_least_squares,
+    inverse_and_row_space,
+    least_norm,
+    null_space,
+    pseudo_inverse,
+    rank,
+    scaled_identity,
+    solve_positive_definite,
+    thin_svd,
+    volume,
+)
+from dikbench.problem.constraints import (
+    CollisionConstraint,
+    Constraint,
+    TorqueConstraint,
+    linearize_all,
+)
+from dikbench.problem.problem import (
+    DikProblem,
+    Formulation,
+    LimitKind,
+    Solve,
+    program_of,
+    promises_of,
+)
+from dikbench.problem.tasks import (
+    CentreOfMassTask,
+    DampingTask,
+    OrientationTask,
+    PoseTask,
+    PositionTask,
+    PostureTask,
+    Task,
+    TrackingTask,
+    TrackingTogether,
+)
+from dikbench.problem.tasks.orientation import LinearizedOrientation
+from dikbench.problem.tasks.task import LinearizedJointTask, LinearizedTask
+from dikbench.problem.velocity_box import Box, Braking, sqrt_brake
+from dikbench.programs.modelled_program import ModelledProgram
+from dikbench.programs.quadratic_program import Program, QuadraticProgram
+from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.limits import Interval, Limits
+from dikbench.robots.robot import Robot
+
+__all__ = [
+    "Array",
+    "Box",
+    "Braking",
+    "CentreOfMassTask",
+    "CollisionConstraint",
+    "Constraint",
+    "DampedInverse",
+    "DampingTask",
+    "DikProblem",
+    "Formulation",
+    "Interval",
+    "Kinematics",
+    "LimitKind",
+    "Limits",
+    "LinearizedJointTask",
+    "LinearizedOrientation",
+    "LinearizedTask",
+    "Mask",
+    "ModelledProgram",
+    "OrientationTask",
+    "PoseTask",
+    "PositionTask",
+    "PostureTask",
+    "Program",
+    "Projector",
+    "QuadraticProgram",
+    "Robot",
+    "Solve",
+    "Task",
+    "TorqueConstraint",
+    "TrackingTask",
+    "TrackingTogether",
+    "damped_least_squares",
+    "inverse_and_row_space",
+    "least_norm",
+    "linearize_all",
+    "null_space",
+    "program_of",
+    "promises_of",
+    "pseudo_inverse",
+    "rank",
+    "scaled_identity",
+    "solve_positive_definite",
+    "sqrt_brake",
+    "thin_svd",
+    "volume",
+]

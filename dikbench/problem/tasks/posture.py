@@ -1,0 +1,69 @@
+"""A posture that the joints should take."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.arrays import Array
+from dikbench.errors import DikbenchError
+from dikbench.linear_algebra import scaled_identity
+from dikbench.problem.tasks.task import LinearizedJointTask, LinearizedTask, check_weight
+from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.robot import Robot
+
+
+@dataclass(frozen=True, eq=False)
+class PostureTask:
+    """Bring the joints to a posture: e = q* (-) q, v = gain e (J = I).
+
+    Attributes:
+        target: the posture q*, (nq,).
+        gain: 1/s.
+        weight: see `LinearizedTask`; one per joint (nv,) for joints that matter unlike.
+        priority: see `LinearizedTask`; by default below the task of the end effector.
+    """
+
+    target: Array
+    gain: float = 1.0
+    weight: float | Array = 1.0
+    priority: int = 2
+
+    def __post_init__(self) -> None:
+        """Check the target."""
+        if not np.isfinite(self.target).all():
+            target = np.asarray(self.target).tolist()
+            raise DikbenchError(f"posture task: expected finite numbers, got {target}")
+
+    def linearize(self, kinematics: Kinematics) -> LinearizedTask:
+        """The task at the configuration of `kinematics`.
+
+        Raises:
+            DikbenchError: if the target is not an array of the robot's shape (nq,), or the weights
+                do not fit the robot.
+        """
+        robot = kinematics.robot
+        if not isinstance(self.target, np.ndarray) or self.target.shape != robot.q0.shape:
+            shape = getattr(self.target, "shape", type(self.target).__name__)
+            raise DikbenchError(f"posture task: expected shape ({robot.nq},), got {shape}")
+        check_weight("posture task", self.weight, robot.nv)
+        error: Array = pin.difference(robot.model, kinematics.q, self.target)
+        return LinearizedJointTask(
+            scaled_identity(robot.nv, 1.0), self.gain * error, error, self.weight, self.priority
+        )
+
+
+def middle_posture(robot: Robot) -> Array:
+    """The middle of the position limits, (nq,), the target of joint centring.
+
+    Raises:
+        DikbenchError: if a joint has no position limits.
+    """
+    middle = robot.limits.middle
+    if middle is None or np.isnan(middle).any():
+        raise DikbenchError(f"robot {robot.name}: not every joint has position limits to centre")
+    posture = robot.q0.copy()
+    posture[robot.limits.q_index] = middle
+    return posture

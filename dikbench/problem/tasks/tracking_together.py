@@ -1,0 +1,44 @@
+"""A tracking task and others of the same priority, as one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from dikbench.problem.tasks.task import LinearizedTask, Task, TrackingTask, stacked
+from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.robot import Robot
+
+
+@dataclass(frozen=True, eq=False)
+class TrackingTogether:
+    """A tracking task with tasks that are to be done with it, such as feet that stay: rows stacked.
+
+    Attributes:
+        tracking: the task whose target moves.
+        others: tasks of the same priority.
+    """
+
+    tracking: TrackingTask
+    others: tuple[Task, ...]
+
+    @property
+    def gain(self) -> float:
+        """That of the tracking, 1/s."""
+        return self.tracking.gain
+
+    @property
+    def priority(self) -> int:
+        """That of the tracking."""
+        return self.tracking.priority
+
+    def rows(self, robot: Robot) -> tuple[int, ...]:
+        """The rows of the twist of the task frame that the tracking is about."""
+        return self.tracking.rows(robot)
+
+    def linearize(
+        self, kinematics: Kinematics, target: Any = None, velocity: Any = None
+    ) -> LinearizedTask:
+        """See `TrackingTask`."""
+        others = [task.linearize(kinematics) for task in self.others]
+        return stacked([self.tracking.linearize(kinematics, target, velocity), *others])

@@ -1,0 +1,256 @@
+"""The velocity box: position, velocity and acceleration limits as bounds on one velocity.
+
+    hi = min( vmax, v_prev + a dt, gain (q_max - q)/dt, brake(q_max - q) ),   lo mirrored,
+
+all in tangent coordinates [rad/s or m/s], shape (nv,). The four ways to brake before a position
+limit at distance d, with a the deceleration that is in force:
+
+* `one-step`: gain 1, no brake: the limit is not passed within this step.
+* `gain`: a share of the distance per step (Pink 0.5, mink 0.95), no brake.
+* `sqrt`: brake = sqrt(2 a d), the continuous-time bound (Flacco, De Luca & Khatib 2012; Pink). In
+  discrete time it is not recursively feasible: kept for comparison.
+* `viable`: the largest speed from which the joint can still stop in time when q+ = q + v dt:
+  k = floor(-1/2 + sqrt(1/4 + 2 d/(a dt^2))), brake = (d/dt + a dt k (k+1)/2)/(k+1).
+
+With no acceleration limit in force `sqrt` and `viable` are `one-step`.
+
+Where the bounds contradict each other position wins over velocity, velocity over acceleration, and
+every joint whose acceleration bound was given up is counted. Outside a position limit the bound
+asks for the way back: hi = max(d/dt, -v_back) with v_back a tenth of the velocity limit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from types import MappingProxyType
+from typing import Final, Literal, get_args
+
+import msgspec
+import numpy as np
+
+from dikbench.arrays import Array
+from dikbench.errors import unknown
+from dikbench.robots.limits import JointLimits, Limits
+
+Braking = Literal["one-step", "gain", "sqrt", "viable"]
+BRAKINGS: Final = get_args(Braking)
+
+FAR: Final = 1e6
+"""Distance [rad] from which a position limit brakes nothing: infinity stays out of the formulas."""
+
+CONFLICT: Final = 1e-9
+"""A bound given up by less than this [rad/s] is rounding, not a relaxation."""
+
+WEAKEST: Final = 1e-9
+"""Deceleration [rad/s^2] below which a joint counts as having none (keeps k finite)."""
+
+HAIR: Final = 1e-9
+"""Share of a distance, and distance [rad], by which rounding cannot bring a limit nearer."""
+
+
+class Box(msgspec.Struct, eq=False):
+    """Bounds on the velocity of one control step.
+
+    Attributes:
+        lower, upper: (nv,) [rad/s or m/s], lower <= upper, infinite where nothing is in force; to
+            be read, not written to: away from limits every step has the same two arrays.
+        relaxed: number of joints whose acceleration bound had to be given up.
+    """
+
+    lower: Array
+    upper: Array
+    relaxed: int
+
+
+def velocity_box(
+    limits: Limits,
+    v_prev: Array | None,
+    dt: float,
+    braking: Braking = "viable",
+    position_gain: float = 0.5,
+) -> Box:
+    """Compute the box at one configuration.
+
+    Args:
+        limits: the limits in force, as seen from the configuration.
+        v_prev: the velocity that was applied last, (nv,); None means no acceleration bound.
+        dt: control period [s].
+        braking: how to approach a position limit.
+        position_gain: share of the distance per step for `gain`.
+
+    Raises:
+        DikbenchError: on an unknown braking.
+    """
+    joint = limits.joint
+    inside = _interior(joint, dt, braking, position_gain)
+    if inside is None or not inside.holds(limits.coordinates):
+        lower, upper = _without_acceleration(limits, dt, braking, position_gain)
+    elif v_prev is None or inside.slowest is None or inside.fastest is None:
+        return inside.box
+    else:
+        lower = np.maximum(inside.box.lower, v_prev + inside.slowest)
+        upper = np.minimum(inside.box.upper, v_prev + inside.fastest)
+        if True not in (lower > upper).tolist():
+            return Box(lower, upper, 0)
+        lower, upper = inside.box.lower, inside.box.upper
+    if joint.acceleration is None or v_prev is None:
+        return Box(lower, upper, 0)
+    return _with_acceleration(
+        lower, upper, v_prev + joint.acceleration.lower * dt, v_prev + joint.acceleration.upper * dt
+    )
+
+
+def _without_acceleration(
+    limits: Limits, dt: float, braking: Braking, position_gain: float
+) -> tuple[Array, Array]:
+    """The bounds of position and velocity limits, (nv,) each."""
+    joint = limits.joint
+    gain = position_gain if braking == "gain" else 1.0
+    to_lower, to_upper = limits.to_lower, limits.to_upper
+    if to_lower is None or to_upper is None:
+        upper = np.full(joint.nv, np.inf)
+        lower = -upper
+    else:
+        upper = to_upper * (gain / dt)
+        lower = to_lower * (-gain / dt)
+        if braking in BRAKES and joint.acceleration is not None:
+            slow_up, slow_down = -joint.acceleration.lower, joint.acceleration.upper
+            brake = BRAKES[braking]
+            upper = np.minimum(upper, brake(to_upper, slow_up, dt))
+            lower = np.maximum(lower, -brake(to_lower, slow_down, dt))
+        if to_upper.min() < 0 or to_lower.min() < 0:
+            _ask_for_the_way_back(joint, to_lower, to_upper, upper, lower, dt)
+    if joint.velocity is not None:
+        upper = np.minimum(upper, joint.velocity.upper)
+        lower = np.maximum(lower, joint.velocity.lower)
+    return lower, upper
+
+
+class _Interior:
+    """Where no position limit bounds the velocity: between `above` and `below`, coordinates (nv,).
+
+    There the box is the velocity limits (and acceleration limits about v_prev), which saves a fast
+    law most of its time.
+    """
+
+    __slots__ = ("above", "below", "box", "fastest", "slowest")
+
+    def __init__(self, joint: JointLimits, dt: float, braking: Braking, gain: float) -> None:
+        assert joint.velocity is not None
+        lower, upper = joint.velocity.lower.copy(), joint.velocity.upper.copy()
+        lower.flags.writeable = upper.flags.writeable = False
+        self.box = Box(lower, upper, 0)
+        self.slowest = self.fastest = None
+        deceleration = np.full(joint.nv, np.inf), np.full(joint.nv, np.inf)
+        if joint.acceleration is not None:
+            self.slowest, self.fastest = (
+                joint.acceleration.lower * dt,
+                joint.acceleration.upper * dt,
+            )
+            deceleration = joint.acceleration.upper, -joint.acceleration.lower
+        self.above: Array | None = None
+        self.below: Array | None = None
+        if joint.position is not None:
+            with np.errstate(invalid="ignore", divide="ignore"):  # no limit is never far enough
+                below = _reach(upper, deceleration[1], dt, braking, gain)
+                above = _reach(-lower, deceleration[0], dt, braking, gain)
+                self.above = joint.position.lower + above
+                self.below = joint.position.upper - below
+
+    def holds(self, coordinates: Array | None) -> bool:
+        """Whether these coordinates (nv,) are inside; for so few, a list is faster than `all`."""
+        if self.above is None or self.below is None or coordinates is None:
+            return True
+        return not (
+            False in (coordinates > self.above).tolist()
+            or False in (coordinates < self.below).tolist()
+        )
+
+
+@lru_cache(maxsize=256)
+def _interior(joint: JointLimits, dt: float, braking: Braking, gain: float) -> _Interior | None:
+    """The interior of these limits; None where it depends on the distance everywhere.
+
+    Raises:
+        DikbenchError: on an unknown braking.
+    """
+    if braking not in BRAKINGS:
+        raise unknown("braking", braking, BRAKINGS)
+    return None if joint.velocity is None else _Interior(joint, dt, braking, gain)
+
+
+def _reach(speed: Array, deceleration: Array, dt: float, braking: Braking, gain: float) -> Array:
+    """Distance (nv,) [rad] from which a position limit allows this speed (nv,) [rad/s].
+
+    The inverse of the bounds, which grow with the distance, and a hair for rounding.
+    """
+    if braking == "gain":
+        distance = speed * dt / gain
+    elif braking == "one-step":
+        distance = speed * dt
+    else:
+        slow = np.maximum(deceleration, WEAKEST)
+        if braking == "sqrt":
+            distance = speed**2 / (2 * slow)
+        else:
+            k = np.floor(speed / (slow * dt))
+            distance = dt * ((k + 1) * speed - np.where(k > 0, slow, 0.0) * dt * k * (k + 1) / 2)
+        distance = np.maximum(speed * dt, np.minimum(distance, FAR))
+    return distance * (1 + HAIR) + HAIR
+
+
+def viable_brake(distance: Array, deceleration: Array, dt: float) -> Array:
+    """Largest speed [rad/s] towards a limit at `distance` [rad] from which a joint can still stop.
+
+    Exact for q+ = q + v dt: braking by deceleration * dt per step it comes to rest on the limit or
+    before it. Infinite where the distance or the deceleration is; 0 outside the limit.
+    """
+    braked = (distance < FAR) & np.isfinite(deceleration)
+    d = np.where(braked, np.maximum(distance, 0.0), 0.0)
+    step = np.where(braked, np.maximum(deceleration, WEAKEST), 1.0) * dt
+    k = np.floor(-0.5 + np.sqrt(0.25 + 2 * d / (step * dt)))
+    speed = (d / dt + step * k * (k + 1) / 2) / (k + 1)
+    return np.where(braked, speed, np.inf)
+
+
+def sqrt_brake(distance: Array, deceleration: Array, dt: float) -> Array:
+    """Continuous-time braking speed sqrt(2 a d) [rad/s], a the deceleration, d the distance."""
+    del dt  # the continuous-time bound does not know the control period
+    braked = (distance < FAR) & np.isfinite(deceleration)
+    d = np.where(braked, np.maximum(distance, 0.0), 0.0)
+    return np.where(braked, np.sqrt(2 * np.where(braked, deceleration, 0.0) * d), np.inf)
+
+
+BRAKES: Final[Mapping[str, Callable[[Array, Array, float], Array]]] = MappingProxyType(
+    {"sqrt": sqrt_brake, "viable": viable_brake}
+)
+"""(distance (nv,) [rad], deceleration (nv,) [rad/s^2], dt [s]) -> speed (nv,) [rad/s]."""
+
+
+def _ask_for_the_way_back(
+    joint: JointLimits, to_lower: Array, to_upper: Array, upper: Array, lower: Array, dt: float
+) -> None:
+    """Overwrite, in place, the bounds of the joints that are outside a position limit."""
+    above, below = to_upper < 0, to_lower < 0
+    upper[above] = to_upper[above] / dt
+    lower[below] = -to_lower[below] / dt
+    way_back = joint.way_back
+    if way_back is not None:
+        up, down = way_back
+        upper[above] = np.maximum(upper[above], -down[above])
+        lower[below] = np.minimum(lower[below], up[below])
+    # In a narrow range the way back must not run through the limit on the other side.
+    upper[above] = np.maximum(upper[above], lower[above])
+    lower[below] = np.minimum(lower[below], upper[below])
+
+
+def _with_acceleration(lower: Array, upper: Array, slowest: Array, fastest: Array) -> Box:
+    """Intersect with [slowest, fastest]; where that is empty, take the nearest velocity allowed."""
+    gap = np.maximum(slowest - upper, lower - fastest)
+    relaxed = int(np.count_nonzero(gap > CONFLICT))
+    return Box(
+        np.clip(slowest, lower, upper),
+        np.clip(fastest, lower, upper),
+        relaxed,
+    )

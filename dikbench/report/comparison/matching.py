@@ -1,0 +1,132 @@
+"""Trials of two results folders, matched by what was selected."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, Final
+
+import pandas as pd
+
+from dikbench.errors import DikbenchError
+from dikbench.metrics import METRICS
+from dikbench.results.columns import KEYS
+from dikbench.simulation.status import Status
+
+TRIAL: Final = [key for key in KEYS if key not in {"status", "message"}]
+"""What makes two trials the same trial: selectors and seed, whatever the versions."""
+
+RANKS: Final[Mapping[str, int]] = MappingProxyType({Status.OK.value: 2, Status.SKIPPED.value: 1})
+"""How good a status is; every other one is a failure, 0."""
+
+
+@dataclass(frozen=True, eq=False)
+class MatchedTrials:
+    """The trials of two folders, A and B.
+
+    Attributes:
+        a, b: the rows of the trials that both have, row by row the same trial.
+        only_a, only_b: the trials that one of them has alone, columns `TRIAL`.
+        metrics: the metrics that both have, in the registry's order.
+        unmatched_columns: what is said of metrics that are not compared.
+    """
+
+    a: pd.DataFrame
+    b: pd.DataFrame
+    only_a: pd.DataFrame
+    only_b: pd.DataFrame
+    metrics: tuple[str, ...]
+    unmatched_columns: tuple[str, ...]
+
+    @cached_property
+    def rank_change(self) -> pd.Series:
+        """How much better the status became: negative where a trial newly fails or is skipped."""
+        ranks = [rows["status"].map(RANKS).fillna(0).astype(int) for rows in (self.a, self.b)]
+        return ranks[1] - ranks[0]
+
+    @property
+    def newly_failed(self) -> int:
+        """Number of trials that end worse in B."""
+        return int((self.rank_change < 0).sum())
+
+    @cached_property
+    def status_changes(self) -> pd.DataFrame:
+        """The trials whose status changed, those that became worse first."""
+        changes = self.a[TRIAL].assign(
+            status_a=self.a["status"],
+            status_b=self.b["status"],
+            message_b=self.b["message"],
+            change=self.rank_change,
+        )
+        changed = changes[self.a["status"] != self.b["status"]]
+        return changed.sort_values("change", kind="stable").drop(columns="change")
+
+    @cached_property
+    def both_ok(self) -> pd.Series:
+        """Whether a trial ran to its end in both: a motion that broke off has no numbers here."""
+        return self.a["status"].eq(Status.OK.value) & self.b["status"].eq(Status.OK.value)
+
+    @property
+    def other_ids(self) -> int:
+        """Number of trials whose law or scenario has another source in B."""
+        if "id" not in self.a or "id" not in self.b:
+            return 0
+        return int((self.a["id"] != self.b["id"]).sum())
+
+
+def match_trials(
+    a: pd.DataFrame, b: pd.DataFrame, names: tuple[str, str] = ("A", "B")
+) -> MatchedTrials:
+    """Match the trials of two folders by formulation, solver, scenario, plant, reference and seed.
+
+    Args:
+        a: the rows of trials.csv of the one.
+        b: of the other.
+        names: how the folders are called in errors.
+
+    Raises:
+        DikbenchError: if one is empty or holds a trial twice, or they have no trial or no metric in
+            common.
+    """
+    for rows, name in zip((a, b), names, strict=True):
+        if rows.empty:
+            raise DikbenchError(f"{name} holds no trials")
+        twice = rows[rows.duplicated(TRIAL)]
+        if len(twice):
+            raise DikbenchError(
+                f"{name} holds a trial twice: {trial_name(twice.iloc[0].to_dict())}"
+            )
+    both = a[TRIAL].assign(at_a=range(len(a))).merge(b[TRIAL].assign(at_b=range(len(b))), on=TRIAL)
+    if both.empty:
+        raise DikbenchError(f"{names[0]} and {names[1]} have no trial in common")
+    metrics = tuple(name for name in METRICS if name in a and name in b)
+    if not metrics:
+        raise DikbenchError(f"{names[0]} and {names[1]} have no metric in common")
+    return MatchedTrials(
+        a.iloc[both["at_a"]].reset_index(drop=True),
+        b.iloc[both["at_b"]].reset_index(drop=True),
+        a.drop(a.index[both["at_a"]])[TRIAL],
+        b.drop(b.index[both["at_b"]])[TRIAL],
+        metrics,
+        _unmatched_columns(a, b),
+    )
+
+
+def trial_name(row: Mapping[Any, Any]) -> str:
+    """A trial in words."""
+    solver = "" if row["solver"] == "none" else f" with {row['solver']}"
+    how = f"{row['plant']} plant, {row['reference']}, seed {row['seed']}"
+    return f"{row['formulation']}{solver} on {row['scenario']} ({how})"
+
+
+def _unmatched_columns(a: pd.DataFrame, b: pd.DataFrame) -> tuple[str, ...]:
+    said = []
+    for name, other, columns in (
+        ("A", "B", a.columns.difference(b.columns)),
+        ("B", "A", b.columns.difference(a.columns)),
+    ):
+        if len(columns):
+            said.append(f"{name} has {', '.join(columns)}, which {other} lacks")
+    return tuple(said)

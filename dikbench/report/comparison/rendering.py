@@ -1,0 +1,202 @@
+"""A comparison in words and tables: Markdown that reads as text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+import pandas as pd
+
+from dikbench.errors import DikbenchError
+from dikbench.report.comparison.comparison import Comparison
+from dikbench.report.comparison.matching import trial_name
+from dikbench.report.tables.markdown import escape, markdown_rows
+
+ON_CONSOLE: Final = 20
+"""So many rows of a list are printed; a file holds all."""
+
+
+def render(comparison: Comparison, rows: int | None = ON_CONSOLE) -> str:
+    """The comparison as Markdown, regressions first.
+
+    Args:
+        comparison: what is shown.
+        rows: of each list, at most so many; None: all.
+    """
+    parts = [
+        f"# {comparison.a} (A) and {comparison.b} (B)",
+        _verdict(comparison),
+        *_statuses(comparison, rows),
+        *_metrics(comparison, rows),
+        *_times(comparison, rows),
+        *_alone(comparison, rows),
+        *_versions(comparison),
+    ]
+    return "\n\n".join(parts)
+
+
+def write(comparison: Comparison, file: Path) -> None:
+    """Write a comparison: `.md`, the text with every row; `.csv`, every difference of every trial.
+
+    Raises:
+        DikbenchError: on another ending, or a file that cannot be written.
+    """
+    if file.suffix == ".md":
+        text = render(comparison, None) + "\n"
+    elif file.suffix == ".csv":
+        text = comparison.trials().to_csv(index=False)
+    else:
+        raise DikbenchError(f"file {file}: valid endings: .md, .csv")
+    try:
+        file.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise DikbenchError(f"file {file}: {error.strerror or error}") from None
+
+
+def _verdict(comparison: Comparison) -> str:
+    matched, laws = comparison.matched, comparison.laws
+    told = [f"{len(matched.a)} trials are in both, {int(matched.both_ok.sum())} ended ok in both."]
+    worse = matched.newly_failed
+    if len(matched.status_changes):
+        told.append(f"{len(matched.status_changes)} changed their status, {worse} to the worse.")
+    if laws.empty:
+        told.append("No metric differs.")
+    else:
+        told.append(
+            f"Of a law's metrics, {int((laws['worse'] > 0).sum())} became worse in some trial and "
+            f"{int((laws['worse'] == 0).sum())} in none."
+        )
+    if comparison.guarded:
+        beyond = comparison.beyond
+        told.append(
+            f"REGRESSED: {beyond} beyond tolerance, {worse} newly failed."
+            if comparison.regressed
+            else "Within tolerance."
+        )
+    return " ".join(told)
+
+
+def _statuses(comparison: Comparison, rows: int | None) -> list[str]:
+    changes = comparison.matched.status_changes
+    if changes.empty:
+        return []
+    lines = [
+        f"- {row['status_a']} -> {row['status_b']}: {escape(trial_name(row))}"
+        + (f": {escape(row['message_b'])}" if row["message_b"] else "")
+        for row in _records(changes.head(_most(rows, changes)))
+    ]
+    return ["## Status", "\n".join([*lines, *_more(rows, changes)])]
+
+
+def _metrics(comparison: Comparison, rows: int | None) -> list[str]:
+    laws = comparison.laws
+    if laws.empty:
+        return []
+    head = laws.head(_most(rows, laws))
+    columns = {
+        "metric": head["metric"],
+        "law": head["formulation"],
+        "solver": head["solver"],
+        "plant": head["plant"],
+        "reference": head["reference"],
+        "beyond": head["beyond"],
+        "worse/better/trials": [
+            f"{row['worse']}/{row['better']}/{row['trials']}" for row in _records(head)
+        ],
+        "mean A": head["mean_a"].map(_number),
+        "mean B - A": head["mean_difference"].map(_signed),
+        "95 % interval": [_interval(row["low"], row["high"]) for row in _records(head)],
+        "worst B - A": head["worst_difference"].map(_signed).where(head["worse"] > 0, ""),
+        "in": [
+            f"{row['scenario']} seed {row['seed']}" if row["worse"] else ""
+            for row in _records(head)
+        ],
+    }
+    if not comparison.guarded:
+        del columns["beyond"]
+    return [
+        "## Metrics",
+        "\n".join([markdown_rows(pd.DataFrame(columns)), *_more(rows, laws)]),
+    ]
+
+
+def _times(comparison: Comparison, rows: int | None) -> list[str]:
+    times = comparison.times
+    if times.empty:
+        return []
+    times = times.sort_values("ratio", ascending=False)
+    head = times.head(_most(rows, times))
+    table = pd.DataFrame(
+        {
+            "law": head["formulation"],
+            "solver": head["solver"],
+            "scenarios": head["scenarios"],
+            "median, B over A": head["ratio"].map(_number),
+            "95 % interval": [
+                _interval(row["low"], row["high"], _number) for row in _records(head)
+            ],
+            "p99, B over A": head["p99_ratio"].map(_number),
+            "unstable": head["unstable"],
+        }
+    )
+    told = ["Ratios of the law's time with its solver, geometric mean over scenarios."]
+    if not comparison.same_machine:
+        told.append("The machines differ: these ratios say nothing of the code alone.")
+    unstable, cells = int(times["unstable"].sum()), int(times["scenarios"].sum())
+    if unstable:
+        told.append(f"Of {cells} cells {unstable} were not stable in A or in B.")
+    return ["## Times", " ".join(told), "\n".join([markdown_rows(table), *_more(rows, times)])]
+
+
+def _alone(comparison: Comparison, rows: int | None) -> list[str]:
+    matched, lines = comparison.matched, []
+    for name, alone in (("A", matched.only_a), ("B", matched.only_b)):
+        if len(alone):
+            count = "1 trial is" if len(alone) == 1 else f"{len(alone)} trials are"
+            lines.append(f"{count} in {name} only:\n")
+            head = alone.head(_most(rows, alone))
+            lines += [f"- {escape(trial_name(row))}" for row in _records(head)]
+            lines += [*_more(rows, alone), ""]
+    lines += [f"{text}." for text in matched.unmatched_columns]
+    return ["## Not compared", "\n".join(lines).strip()] if lines else []
+
+
+def _versions(comparison: Comparison) -> list[str]:
+    told = []
+    if comparison.matched.other_ids:
+        told.append(
+            f"{comparison.matched.other_ids} of the trials in both have another id: the source of "
+            "their law or of their scenario differs."
+        )
+    if comparison.versions:
+        table = pd.DataFrame(comparison.versions, columns=["what", "A", "B"])
+        told.append(markdown_rows(table))
+    return ["## Versions", *told] if told else []
+
+
+def _records(table: pd.DataFrame) -> list[dict[str, Any]]:
+    return [{str(name): value for name, value in row.items()} for row in table.to_dict("records")]
+
+
+def _most(rows: int | None, table: pd.DataFrame) -> int:
+    return len(table) if rows is None else rows
+
+
+def _more(rows: int | None, table: pd.DataFrame) -> list[str]:
+    left = len(table) - _most(rows, table)
+    return [f"\n... and {left} more (--out FILE.md has them)"] if left > 0 else []
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}"
+
+
+def _signed(value: float) -> str:
+    return "undefined" if math.isnan(value) else f"{value:+.3g}"
+
+
+def _interval(low: float, high: float, shown: Callable[[float], str] = _signed) -> str:
+    """Both ends; empty where one trial says nothing of others."""
+    return "" if math.isnan(low) else f"{shown(low)} to {shown(high)}"

@@ -1,0 +1,53 @@
+"""Times of two folders: ratios only, with what speaks against comparing them."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+import pandas as pd
+
+from dikbench.report.comparison.matching import MatchedTrials
+from dikbench.results.columns import CELL
+from dikbench.selector import parse_selector
+from dikbench.statistics.hierarchical_bootstrap import draw_weights, mean_intervals
+from dikbench.statistics.stability import STABLE
+
+COMPARED: Final = ("law_time_median_us", "law_time_p99_us")
+
+
+def time_ratios(matched: MatchedTrials) -> pd.DataFrame:
+    """A row per law and solver with times in both: geometric means over scenarios of B / A.
+
+    Returns:
+        Columns `formulation`, `solver`, `scenarios`, `ratio` of the medians with its interval
+        `low`, `high`, `p99_ratio`, and `unstable`: at how many of the scenarios a time of A or of
+        B is not stable.
+    """
+    wanted = [*COMPARED, "timing_verdict"]
+    if not all(name in rows for rows in (matched.a, matched.b) for name in wanted):
+        return pd.DataFrame()
+    a, b = (rows[[*CELL, *wanted]] for rows in (matched.a, matched.b))
+    timed = (a[COMPARED[0]] > 0) & (b[COMPARED[0]] > 0) & ~a.duplicated(CELL)
+    rows: list[dict[str, Any]] = []
+    for (formulation, solver), cells in a[timed].groupby(CELL[:2], sort=False):
+        other = b.loc[cells.index]
+        logs = np.column_stack([np.log(other[name] / cells[name]) for name in COMPARED])
+        families = [parse_selector(text).name for text in cells["scenario"]]
+        weights = draw_weights(families, list(cells["scenario"]))
+        low, high = np.exp(mean_intervals(logs[:, :1], weights)[0])
+        stable = cells["timing_verdict"].eq(STABLE) & other["timing_verdict"].eq(STABLE)
+        ratio, p99_ratio = np.exp(logs.mean(axis=0))
+        rows.append(
+            {
+                "formulation": formulation,
+                "solver": solver,
+                "scenarios": len(cells),
+                "ratio": ratio,
+                "low": low,
+                "high": high,
+                "p99_ratio": p99_ratio,
+                "unstable": int((~stable).sum()),
+            }
+        )
+    return pd.DataFrame(rows)

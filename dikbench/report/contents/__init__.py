@@ -1,0 +1,1 @@
+"""What a report holds: the laws, families and references of its rows."""

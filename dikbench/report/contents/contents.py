@@ -1,0 +1,130 @@
+"""What a report says, whatever it is rendered to."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import pandas as pd
+
+from dikbench.metrics import METRICS
+from dikbench.report.contents.laws_and_families import Family, Law, families_of, laws_of
+from dikbench.report.drawing.figure import Figure
+from dikbench.report.sentences.limitations import Limitation, limitations, missing
+from dikbench.report.sentences.summary import Summary, summarise
+from dikbench.report.tables.build import make_table
+from dikbench.report.tables.kinds import KINDS
+from dikbench.report.tables.return_codes import return_codes
+from dikbench.report.tables.table import Table
+from dikbench.results.lenient_reading import Results
+
+
+@dataclass(frozen=True, eq=False)
+class Contents:
+    """What a report says.
+
+    Attributes:
+        results: what it is about.
+        summary: what a person reads first.
+        tables: tracking error, limit violation, timing.
+        return_codes: a row per solver.
+        families: the scenario families of the run.
+        laws: its laws.
+        limitations: what to keep in mind.
+        figures: what was drawn.
+    """
+
+    results: Results
+    summary: Summary
+    tables: Sequence[Table]
+    return_codes: pd.DataFrame
+    families: Sequence[Family]
+    laws: Sequence[Law]
+    limitations: Sequence[Limitation]
+    figures: Sequence[Figure]
+
+    @property
+    def manifest(self) -> Mapping[str, Any]:
+        """The description of the run."""
+        return self.results.manifest
+
+    @property
+    def name(self) -> str:
+        """The study's name."""
+        return str(self.manifest["study"].get("name") or self.results.folder.path.name)
+
+    @property
+    def description(self) -> str:
+        """What the study is, in a sentence."""
+        text = str(self.manifest["study"].get("description", "")).strip()
+        return text if text.endswith((".", "?", "!")) or not text else f"{text}."
+
+    @cached_property
+    def counts(self) -> list[tuple[int, str]]:
+        """How many trials there are, and how they ended; what did not occur is left out."""
+        trials = self.results.trials
+        status = trials["status"]
+        laws = trials[["formulation", "solver"]].drop_duplicates()
+        found = [
+            (len(trials), "trials"),
+            (int((~status.isin(["ok", "skipped"])).sum()), "failed"),
+            (int(status.eq("skipped").sum()), "skipped"),
+            (missing(trials, self.manifest), "missing"),
+            (len(laws), "laws with their solvers"),
+            (trials["scenario"].nunique(), "scenarios"),
+            (trials["seed"].nunique(), "seeds" if trials["seed"].nunique() > 1 else "seed"),
+        ]
+        return [(count, what) for count, what in found if count or what in {"trials", "failed"}]
+
+    @property
+    def environment(self) -> list[tuple[str, str]]:
+        """The machine and the versions, as far as the manifest knows them."""
+        known = self.manifest
+        libraries = _versions(known.get("libraries"))
+        rows = (
+            ("Started", known.get("started")),
+            ("Commit", known.get("git_commit")),
+            ("Machine", known.get("cpu")),
+            ("Cores", known.get("cores")),
+            ("Clock governor", known.get("governor")),
+            ("System", known.get("system")),
+            ("Python", known.get("python")),
+            ("Linear algebra", known.get("blas")),
+            ("Libraries", libraries),
+            ("Solvers", _versions(known.get("solvers"))),
+        )
+        return [(name, str(value)) for name, value in rows if value]
+
+    @property
+    def manifest_text(self) -> str:
+        """The manifest as it is stored."""
+        return json.dumps(self.manifest, indent=2, ensure_ascii=False)
+
+
+def _versions(of: Any) -> str:
+    return ", ".join(f"{name} {version}" for name, version in dict(of or {}).items())
+
+
+def gather(results: Results, figures: Sequence[Figure]) -> Contents:
+    """Say what results say.
+
+    Args:
+        results: rows and manifest.
+        figures: what was drawn of them.
+    """
+    trials = results.trials
+    unknown = [name for name in METRICS if trials[name].isna().all()]
+    measured = trials.drop(columns=unknown)
+    return Contents(
+        results,
+        summarise(trials),
+        [make_table(kind, measured) for kind in KINDS],
+        return_codes(trials),
+        families_of(trials),
+        laws_of(trials),
+        limitations(trials, results.manifest, results.notes),
+        figures,
+    )

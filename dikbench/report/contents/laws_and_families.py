@@ -1,0 +1,196 @@
+"""The laws and the families of a run, as a page describes them."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import pandas as pd
+
+from dikbench.plugins.built_scenarios import built
+from dikbench.plugins.registry import plugins
+from dikbench.report.contents.docstring import Docstring, parse_docstring
+from dikbench.report.contents.references import references
+from dikbench.scenario.oracle import ORACLE
+from dikbench.selector import parse_selector
+
+MOST_CERTIFICATES: Final = 40
+"""Scenarios of a family whose certificates are shown."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A law as it was run.
+
+    Attributes:
+        selector: as the user wrote it.
+        solvers: with which it ran.
+        attributes: every attribute and its value, in words.
+    """
+
+    selector: str
+    solvers: tuple[str, ...]
+    attributes: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Law:
+    """A law of a run.
+
+    Attributes:
+        name: of the law, or path/to/file.py:Class.
+        text: its docstring; None where it cannot be found here.
+        variants: as it was run.
+        references: what the keys of its source stand for.
+    """
+
+    name: str
+    text: Docstring | None
+    variants: tuple[Variant, ...]
+    references: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Certified:
+    """A scenario of a run.
+
+    Attributes:
+        selector: of the scenario.
+        claims: its certificate, claim by claim.
+        problem: why it cannot be built here; empty where it can.
+    """
+
+    selector: str
+    claims: tuple[str, ...]
+    problem: str = ""
+
+
+@dataclass(frozen=True)
+class Family:
+    """A scenario family of a run.
+
+    Attributes:
+        name: of the family.
+        text: its docstring; None where it is not registered here.
+        scenarios: its scenarios in the run, with the certificates of their first seed.
+        left_out: how many more there are.
+        variation: what a seed perturbs, in words.
+    """
+
+    name: str
+    text: Docstring | None
+    scenarios: tuple[Certified, ...]
+    left_out: int
+    variation: str
+
+
+def laws_of(trials: pd.DataFrame) -> list[Law]:
+    """The laws of a run in its order, the oracle last."""
+    solvers: dict[str, list[str]] = {}
+    for selector, solver in zip(trials["formulation"], trials["solver"], strict=True):
+        with_ = solvers.setdefault(selector, [])
+        if solver not in ("none", *with_):
+            with_.append(solver)
+    groups: dict[str, list[str]] = {}
+    for selector in solvers:
+        groups.setdefault(parse_selector(selector).name, []).append(selector)
+    found = []
+    for name in sorted(groups, key=lambda name: name == ORACLE):
+        text, defaults, file = _described(name)
+        variants = tuple(
+            Variant(
+                selector,
+                tuple(solvers[selector]),
+                {**defaults, **parse_selector(selector).parameters},
+            )
+            for selector in groups[name]
+        )
+        parsed = None if text is None else parse_docstring(text)
+        cited = references(file, parsed.titled.get("Source", "")) if parsed else ()
+        found.append(Law(name, parsed, variants, cited))
+    return found
+
+
+def _described(name: str) -> tuple[str | None, dict[str, str], Path | None]:
+    """Docstring, default values and file of a law.
+
+    A law that is given as a file is read and not executed: results are data, and remaking their
+    report must not run what they name.
+    """
+    if name == ORACLE:
+        return (
+            "The joint motion from which a scenario's path was built, scored like a law.",
+            {},
+            None,
+        )
+    path, colon, class_name = name.rpartition(":")
+    if colon and path.endswith(".py"):
+        return *_read(Path(path), class_name), None
+    plugin = plugins("formulation").get(name)
+    if plugin is None:
+        return None, {}, None
+    defaults = {
+        key: str(parameter.default)
+        for key, parameter in plugin.parameters.items()
+        if parameter.default is not parameter.empty
+    }
+    return plugin.documented.__doc__ or "", defaults, Path(plugin.file)
+
+
+def _read(file: Path, class_name: str) -> tuple[str | None, dict[str, str]]:
+    try:
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError, SyntaxError):
+        return None, {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ClassDef) and node.name == class_name:
+            fields = {
+                line.target.id: ast.unparse(line.value)
+                for line in node.body
+                if isinstance(line, ast.AnnAssign)
+                and isinstance(line.target, ast.Name)
+                and line.value is not None
+                and "ClassVar" not in ast.unparse(line.annotation)
+            }
+            return ast.get_docstring(node) or "", fields
+    return None, {}
+
+
+def families_of(trials: pd.DataFrame) -> list[Family]:
+    """The families of a run in its order, with the certificates of their scenarios."""
+    seed = int(trials["seed"].min())
+    groups: dict[str, list[str]] = {}
+    for selector in trials["scenario"].unique():
+        groups.setdefault(parse_selector(selector).name, []).append(selector)
+    known = plugins("scenario")
+    found = []
+    for name, selectors in groups.items():
+        plugin = known.get(name)
+        certified, variation = _certified(selectors[:MOST_CERTIFICATES], seed)
+        found.append(
+            Family(
+                name,
+                parse_docstring(plugin.documented.__doc__ or "") if plugin else None,
+                certified,
+                len(selectors) - len(certified),
+                variation,
+            )
+        )
+    return found
+
+
+def _certified(selectors: Iterable[str], seed: int) -> tuple[tuple[Certified, ...], str]:
+    """Scenarios with their certificates, and what a seed perturbs of the last one."""
+    found, variation = [], ""
+    for selector in selectors:
+        scenario = built(selector, seed)
+        if isinstance(scenario, str):
+            found.append(Certified(selector, (), scenario))
+        else:
+            claims = tuple(str(claim) for claim in scenario.certificate.claims)
+            found.append(Certified(selector, claims))
+            variation = str(scenario.variation)
+    return tuple(found), variation

@@ -1,0 +1,116 @@
+"""What a run exports, read back: results that were committed without their store."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+from typing import Any, Final
+
+import pandas as pd
+
+from dikbench.errors import DikbenchError
+from dikbench.results.columns import KEYS
+
+TRIALS: Final = "trials.csv"
+PARQUET: Final = "trials.parquet"
+MANIFEST: Final = "manifest.json"
+
+TEXT: Final = ("id", *(key for key in KEYS if key != "seed"), "environment", "timing_verdict")
+NEEDED: Final = tuple(name for name in KEYS if name != "message")
+"""Columns without which a row says nothing."""
+
+
+def are_exported(folder: Path) -> bool:
+    """Whether a folder holds exported trials: as CSV or, a fifth of it, as Parquet."""
+    return (folder / TRIALS).is_file() or (folder / PARQUET).is_file()
+
+
+def read_trials(folder: Path, notes: list[str]) -> pd.DataFrame:
+    """The trials as the store had them; columns that were not known then lack.
+
+    Args:
+        folder: the results folder.
+        notes: gets a sentence about what is damaged and was left out.
+
+    Raises:
+        DikbenchError: if there are none, or not what a run writes.
+    """
+    if not (folder / TRIALS).is_file() and (folder / PARQUET).is_file():
+        return _parquet(folder / PARQUET)
+    trials = _rows(folder / TRIALS, notes)
+    for name in trials.columns:
+        if name not in TEXT:
+            trials[name] = _numbers(trials[name])
+        elif name != "message":
+            trials[name] = trials[name].replace("", None)
+    return trials
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """The description of the run.
+
+    Raises:
+        DikbenchError: if it cannot be read.
+    """
+    path = folder / MANIFEST
+    try:
+        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise DikbenchError(f"{path} cannot be read: {reason}") from None
+    return found
+
+
+def _parquet(file: Path) -> pd.DataFrame:
+    try:
+        trials = pd.read_parquet(file)
+    except (OSError, ValueError) as error:  # Arrow's own are among them
+        reason = " ".join(str(error).split())
+        raise DikbenchError(f"{file}: not a table of trials: {reason}") from None
+    for name in NEEDED:
+        if name not in trials:
+            raise DikbenchError(f"{file}: not a table of trials: it has no column {name!r}")
+    return trials
+
+
+def _rows(file: Path, notes: list[str]) -> pd.DataFrame:
+    """The rows of a CSV file as texts, without those that are cut off or have too many values."""
+    if not file.is_file():
+        raise DikbenchError(
+            f"no results in {file.parent}: neither results.sqlite nor {file.name} is there"
+        )
+    try:
+        text = file.read_text(encoding="utf-8")
+        lines = list(csv.reader(io.StringIO(text, newline="")))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise DikbenchError(f"{file}: not a table of trials: {error}") from None
+    header = lines[0] if lines else []
+    for name in NEEDED:
+        if header.count(name) != 1:
+            often = "no column" if name not in header else "more than one column"
+            raise DikbenchError(f"{file}: not a table of trials: it has {often} {name!r}")
+    ended = lines[1:] if text.endswith("\n") else lines[1:-1]  # a value that was cut may look whole
+    whole = [line for line in ended if len(line) == len(header)]
+    rows = pd.DataFrame(whole, columns=header)
+    rows = rows.loc[:, ~rows.columns.duplicated()]
+    rows = rows[(rows[list(NEEDED)] != "").all(axis=1)]
+    if len(rows) < len(lines) - 1:
+        left_out = len(lines) - 1 - len(rows)
+        notes.append(f"{file.name} is damaged: {left_out} of {len(lines) - 1} rows are left out.")
+    return rows.reset_index(drop=True)
+
+
+def _numbers(texts: pd.Series) -> pd.Series:
+    """Integers where all are, else floats, empty ones missing, else what they were.
+
+    By Python's own reading: that of pandas errs in the last bit.
+    """
+    kinds: tuple[type, ...] = (int, float)
+    for kind in kinds:
+        try:
+            return texts.replace("", float("nan")).astype(kind)
+        except (ValueError, TypeError):
+            continue
+    return texts

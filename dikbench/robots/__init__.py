@@ -1,0 +1,1 @@
+"""Robots: models, limits, kinematics, the catalogue, and arms that are built in code."""

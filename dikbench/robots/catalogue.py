@@ -1,0 +1,329 @@
+"""The robots that are known by name, and robots from a user's URDF."""
+
+from __future__ import annotations
+
+import os.path
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+from math import pi
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.arrays import Array
+from dikbench.errors import DikbenchError, unknown
+from dikbench.robots.captured_stderr import captured_stderr
+from dikbench.robots.denavit_hartenberg import denavit_hartenberg_arm
+from dikbench.robots.example_robot_data import DataModel, data_file, joints, urdf_visuals
+from dikbench.robots.omnidirectional_base import omnidirectional_base
+from dikbench.robots.planar_arm import planar_arm
+from dikbench.robots.robot import Robot, checked_vector, frame_id, model_limits
+
+UR_START = (0.3, -1.2, 1.4, -1.7, -1.4, 0.2)
+NOT_PUBLISHED = "no data sheet or manual gives any"
+IN_CODE_ONLY = "chosen for this robot, which exists in code only"
+LWR_TABLE = tuple(
+    (0.0, turn * pi / 2, d)
+    for turn, d in zip((1, -1, -1, 1, 1, -1, 0), (0.3105, 0, 0.40, 0, 0.39, 0, 0.078), strict=True)
+)
+"""a [m], alpha [rad], d [m]; lengths as in Flacco, De Luca & Khatib 2015."""
+HALF_SITTING = (
+    *(0, 0, 1.01927, 0, 0, 0),
+    *(0, 0, -0.411354, 0.859395, -0.448041, -0.001708),
+    *(0, 0, -0.411354, 0.859395, -0.448041, -0.001708),
+    *(0, 0.006761),
+    *(0.258470, 0.6, -0.0002, -1.2, 0, 0, 0.1),
+    *(-0.258470, -0.6, 0.0002, -1.2, 0, 0, 0.1),
+    *(0, 0),
+)
+"""Base, left and right leg, torso, left and right arm, head: Talos' own half-sitting posture (its
+SRDF), the elbows bent from 0.5 to 1.2 rad and the arms 0.4 rad farther from the body, away from
+limits."""
+UR_PAIRS = "ur_description/srdf/ur5_gripper.srdf"
+"""Of the UR5; its sisters have the same links in the same order."""
+UR_BRAKING = (
+    "joint speed limit over 0.5 s, the braking ramp that the safety system enforces "
+    "(UR10/CB3 user manual, safety inputs)"
+)
+
+
+@dataclass(frozen=True)
+class CatalogueEntry:
+    """What must be known of a robot beyond its model file.
+
+    Attributes:
+        summary: one line for `dikbench list robots`.
+        model: builds the Pinocchio model.
+        frame: the default task frame.
+        start: a safe start, away from limits and singularities, (nv,): joint by joint [rad].
+        acceleration: acceleration limits, (nv,) [rad/s^2] (no model file carries any), or None.
+        acceleration_source: where they come from.
+        task_rows: see `Robot`.
+    """
+
+    summary: str
+    model: Callable[[], Any]
+    frame: str
+    start: tuple[float, ...]
+    acceleration: tuple[float, ...] | None
+    acceleration_source: str
+    task_rows: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
+
+
+ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
+    {
+        "panda": CatalogueEntry(
+            summary="Franka Emika Panda, 7 joints, fingers locked",
+            model=DataModel(
+                "panda_description/urdf/panda.urdf",
+                moving=joints("panda_joint{}", 1, 7),
+                srdf="panda_description/srdf/panda.srdf",
+            ),
+            frame="panda_hand_tcp",
+            start=(0, -pi / 4, 0, -3 * pi / 4, 0, pi / 2, pi / 4),
+            acceleration=(15, 7.5, 10, 12.5, 15, 20, 20),
+            acceleration_source="Franka Control Interface, joint limits of the Panda",
+        ),
+        "ur3": CatalogueEntry(
+            summary="Universal Robots UR3, 6 joints, the UR5's small sister",
+            model=DataModel("ur_description/urdf/ur3_robot.urdf", srdf=UR_PAIRS),
+            frame="tool0",
+            start=UR_START,
+            acceleration=(4.32, 4.32, 6.3, 6.4, 6.4, 6.4),
+            acceleration_source=UR_BRAKING,
+        ),
+        "ur5": CatalogueEntry(
+            summary="Universal Robots UR5, 6 joints, spherical-like wrist",
+            model=DataModel("ur_description/urdf/ur5_robot.urdf", srdf=UR_PAIRS),
+            frame="tool0",
+            start=UR_START,
+            acceleration=(6.3, 6.3, 6.3, 6.4, 6.4, 6.4),
+            acceleration_source=UR_BRAKING,
+        ),
+        "ur10": CatalogueEntry(
+            summary="Universal Robots UR10, 6 joints, the UR5's longer sister",
+            model=DataModel("ur_description/urdf/ur10_robot.urdf", srdf=UR_PAIRS),
+            frame="tool0",
+            start=UR_START,
+            acceleration=(4.32, 4.32, 6.3, 6.4, 6.4, 6.4),
+            acceleration_source=UR_BRAKING,
+        ),
+        "xarm7": CatalogueEntry(
+            summary="UFACTORY xArm7, 7 joints; its zero posture is singular",
+            model=DataModel(
+                "xarm_description/urdf/xarm7.urdf", srdf="xarm_description/srdf/xarm7.srdf"
+            ),
+            frame="link_eef",
+            start=(0, -0.5, 0, 1.0, 0, 1.3, 0),
+            acceleration=(20,) * 7,
+            acceleration_source="UFACTORY xArm SDK, joint acceleration at most 20 rad/s^2",
+        ),
+        "kinova": CatalogueEntry(
+            summary="Kinova Jaco 2 (j2s6s200), 6 joints, three of them continuous",
+            model=DataModel("kinova_description/robots/kinova.urdf"),
+            frame="j2s6s200_end_effector",
+            start=(0, 2.9, 1.3, -2.07, 1.4, 0),
+            acceleration=None,
+            acceleration_source=NOT_PUBLISHED,
+        ),
+        "tiago": CatalogueEntry(
+            summary="the arm of PAL Robotics' TIAGo, 7 joints, torso, head and wheels locked",
+            model=DataModel(
+                "tiago_description/robots/tiago_no_hand.urdf", moving=joints("arm_{}_joint", 1, 7)
+            ),
+            frame="arm_tool_link",
+            start=(1.4, -0.4, -1.2, 1.5, 0, -0.5, 0.4),
+            acceleration=None,
+            acceleration_source=NOT_PUBLISHED,
+        ),
+        "talos": CatalogueEntry(
+            summary="the left arm of PAL Robotics' Talos, 7 joints, all others locked",
+            model=DataModel(
+                "talos_data/robots/talos_reduced.urdf",
+                moving=joints("arm_left_{}_joint", 1, 7),
+                srdf="talos_data/srdf/talos.srdf",
+            ),
+            frame="gripper_left_base_link",
+            start=(-0.4, 0.9, 0.6, -1.5, 0.5, 0.5, -0.1),
+            acceleration=None,
+            acceleration_source=NOT_PUBLISHED,
+        ),
+        "talos-humanoid": CatalogueEntry(
+            summary="PAL Robotics' Talos on its feet: a free base and 30 joints, grippers locked",
+            model=DataModel(
+                "talos_data/robots/talos_reduced.urdf",
+                moving=(
+                    *joints("leg_left_{}_joint", 1, 6),
+                    *joints("leg_right_{}_joint", 1, 6),
+                    *joints("torso_{}_joint", 1, 2),
+                    *joints("arm_left_{}_joint", 1, 7),
+                    *joints("arm_right_{}_joint", 1, 7),
+                    *joints("head_{}_joint", 1, 2),
+                ),
+                root=pin.JointModelFreeFlyer,
+            ),
+            frame="gripper_right_base_link",
+            start=HALF_SITTING,
+            acceleration=None,
+            acceleration_source=NOT_PUBLISHED,
+        ),
+        "lwr": CatalogueEntry(
+            summary="KUKA LWR, 7 joints, kinematics only, from its Denavit-Hartenberg table",
+            model=lambda: denavit_hartenberg_arm(
+                "lwr",
+                LWR_TABLE,
+                position_limits=tuple(np.deg2rad((170, 120, 170, 120, 170, 120, 170))),
+                velocity_limits=tuple(np.deg2rad((100, 110, 100, 130, 130, 180, 180))),
+            ),
+            frame="tool",
+            start=(0.0, pi / 4, pi / 4, pi / 4, pi / 4, pi / 4, 0.0),
+            acceleration=(5 * pi / 3,) * 7,
+            acceleration_source="Flacco, De Luca & Khatib 2015 (300 deg/s^2)",
+        ),
+        "planar1r": CatalogueEntry(
+            summary="one joint with limits 0 and 2 pi, that turns a link of 0.4 m",
+            model=lambda: planar_arm((0.4,), velocity_limits=(2.0,), position_limit=(0, 2 * pi)),
+            frame="tip",
+            start=(pi,),
+            acceleration=(10.0,),
+            acceleration_source=IN_CODE_ONLY,
+            task_rows=(5,),
+        ),
+        "planar4r": CatalogueEntry(
+            summary="a planar arm of four links of 0.25 m, built in code",
+            model=lambda: planar_arm((0.25,) * 4, velocity_limits=(2.0, 2.0, 4.0, 4.0)),
+            frame="tip",
+            start=(0.0, pi / 2, -pi / 2, pi / 2),
+            acceleration=(2.0, 2.0, 4.0, 4.0),
+            acceleration_source="Flacco, De Luca & Khatib 2015",
+            task_rows=(0, 1, 5),
+        ),
+        "base": CatalogueEntry(
+            summary="an omnidirectional mobile base in the plane, without limits",
+            model=omnidirectional_base,
+            frame="base",
+            start=(0.0, 0.0, 0.0),
+            acceleration=None,
+            acceleration_source=IN_CODE_ONLY,
+            task_rows=(0, 1, 5),
+        ),
+        "planar3r": CatalogueEntry(
+            summary="a planar arm of three links (0.4, 0.3, 0.2 m), built in code",
+            model=lambda: planar_arm((0.4, 0.3, 0.2), velocity_limits=(2.0,) * 3),
+            frame="tip",
+            start=(0.3, 1.6, 0.6),
+            acceleration=(10.0, 10.0, 10.0),
+            acceleration_source=IN_CODE_ONLY,
+            task_rows=(0, 1, 5),
+        ),
+    }
+)
+
+
+def load_robot(name_or_urdf: str, frame: str | None = None, *, start: object = None) -> Robot:
+    """Load a robot by name, or any URDF file together with the name of its task frame.
+
+    Position, velocity and effort limits are the model's; effort and acceleration limits are known
+    but not in force (see `Robot.with_limits`).
+
+    Args:
+        name_or_urdf: a name of `dikbench list robots`, or the path of a URDF file.
+        frame: the task frame; default: the catalogue's. A URDF has no default.
+        start: the safe start, shape (nq,) [rad]; default: the catalogue's, for a URDF the
+            best-conditioned of a few dozen seeded postures inside the limits.
+
+    Raises:
+        DikbenchError: on an unknown robot or frame, a file that is missing or does not parse, or a
+            start outside the limits.
+    """
+    text = str(name_or_urdf)
+    if text in ROBOTS:
+        robot = _load_named(text)
+    elif text.endswith((".urdf", ".xml")) or "/" in text or os.path.isfile(text):
+        robot = _load_urdf(text, frame)
+    else:
+        raise unknown("robot", text, ROBOTS, "(or give the path of a .urdf file)")
+    if frame is not None and frame != robot.frame:
+        frame_id(robot.model, frame)
+        robot = replace(robot, frame=frame)
+    if start is None:
+        return robot
+    q0 = checked_vector(start, robot.nq, f"start of {text}")
+    limits = robot.limits.at(q0)
+    assert limits.to_lower is not None
+    assert limits.to_upper is not None
+    if np.any(limits.to_lower < 0) or np.any(limits.to_upper < 0):
+        raise DikbenchError(f"start of {text}: {q0.tolist()} is outside the position limits")
+    return replace(robot, q0=q0)
+
+
+@lru_cache
+def _load_named(name: str) -> Robot:
+    entry = ROBOTS[name]
+    model = entry.model()
+    model.name = name
+    limits = model_limits(model).with_interval("effort", None)
+    acceleration = None if entry.acceleration is None else np.array(entry.acceleration, dtype=float)
+    q0 = pin.integrate(model, pin.neutral(model), np.array(entry.start, dtype=float))
+    robot = Robot(name, model, entry.frame, limits, q0, entry.task_rows, acceleration)
+    if not isinstance(entry.model, DataModel):
+        return robot
+    srdf = entry.model.srdf
+    return replace(
+        robot,
+        visuals=entry.model.visuals,
+        urdf=data_file(entry.model.urdf),
+        srdf=None if srdf is None else data_file(srdf),
+    )
+
+
+def _load_urdf(path: str, frame: str | None) -> Robot:
+    if not os.path.isfile(path):  # unlike Path.is_file, False for a name that is too long
+        raise DikbenchError(f"robot file not found: {path}")
+    with captured_stderr() as complaints:
+        try:
+            model = pin.buildModelFromUrdf(path)
+        except (ValueError, RuntimeError) as error:
+            reason = " ".join(f"{error} {complaints()}".split())
+            raise DikbenchError(
+                f"robot file {path} is not a URDF that Pinocchio reads: {reason}"
+            ) from None
+    if model.nv == 0:
+        raise DikbenchError(f"robot file {path}: the model has no moving joint")
+    if frame is None:
+        frames = ", ".join(f.name for f in model.frames if f.name != "universe")
+        raise DikbenchError(f"robot file {path}: name its task frame; valid: {frames}")
+    limits = model_limits(model).with_interval("effort", None)
+    name = Path(path).stem
+    start = _well_conditioned_start(model, frame)
+    visuals = partial(urdf_visuals, model, path, Path(path).absolute().parent)
+    return Robot(name, model, frame, limits, start, visuals=visuals, urdf=path)
+
+
+def _well_conditioned_start(model: Any, frame: str) -> Array:
+    """The posture with the largest smallest singular value among a few dozen inside the limits."""
+    data, index = model.createData(), frame_id(model, frame)
+    limits = model_limits(model)
+    assert limits.position is not None
+    lower = np.maximum(limits.position.lower, -pi)
+    upper = np.minimum(limits.position.upper, pi)
+    middle, half = (lower + upper) / 2, (upper - lower) / 2
+    neutral = pin.neutral(model)
+    random = np.random.default_rng(0)
+    best, best_sigma = neutral, -1.0
+    for sample in range(64):
+        spread = 0.0 if sample == 0 else 0.6
+        x = middle + spread * half * random.uniform(-1, 1, model.nv)
+        q = pin.integrate(model, neutral, x)
+        q[limits.q_index] = np.where(np.isfinite(limits.position.upper), x, q[limits.q_index])
+        J = pin.computeFrameJacobian(model, data, q, index, pin.LOCAL)
+        J = J.reshape(6, model.nv)  # of a single joint Pinocchio gives a vector
+        sigma = np.linalg.svd(J, compute_uv=False)[min(6, model.nv) - 1]
+        if sigma > best_sigma:
+            best, best_sigma = q, float(sigma)
+    start: Array = best
+    return start

@@ -1,0 +1,103 @@
+"""The bodies of a robot: what must not touch an obstacle, or another of them."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.arrays import Array
+from dikbench.errors import DikbenchError
+from dikbench.robots.captured_stderr import captured_stderr
+from dikbench.robots.collision.enclosing_capsule import enclosing_capsule
+from dikbench.robots.collision.obstacles import capsule
+from dikbench.robots.robot import Robot
+
+LINK_RADIUS: Final = 0.04
+"""Of the links of a robot without collision geometry [m]."""
+
+POINT: Final = 1e-3
+"""A link shorter than this [m] has no body of its own."""
+
+
+def collision_bodies(robot: Robot) -> Any:
+    """The bodies of a robot, as a `pinocchio.GeometryModel` for its model, without pairs.
+
+    Those of its URDF's collision geometry: primitive shapes as they are, around each mesh a capsule
+    that contains all its vertices (and with them the mesh, a capsule being convex), so that
+    distances are never larger than the mesh's. Without a URDF: capsules of radius 0.04 m along the
+    links, from each joint to the next ones.
+
+    Raises:
+        DikbenchError: if a mesh is missing, or there is nothing to make bodies of.
+    """
+    bodies = _from_urdf(robot) if robot.urdf else _along_links(robot.model)
+    if not len(bodies.geometryObjects):
+        raise DikbenchError(f"robot {robot.name}: no collision geometry and no links are known")
+    return bodies
+
+
+def _from_urdf(robot: Robot) -> Any:
+    full, fitted = _fitted(str(robot.urdf))
+    moving = set(robot.model.names)
+    locked = [full.getJointId(name) for name in full.names if name not in moving]
+    if not locked:
+        return fitted.copy()
+    _, bodies = pin.buildReducedModel(full, fitted, locked, pin.neutral(full))
+    return bodies
+
+
+@lru_cache(maxsize=8)
+def _fitted(urdf: str) -> tuple[Any, Any]:
+    """The model of a URDF, all joints moving, and its collision geometry with fitted capsules."""
+    # A package:// path starts at one of the folders above the file.
+    folders = [str(folder) for folder in Path(urdf).resolve().parents]
+    with captured_stderr() as complaints:
+        try:
+            model = pin.buildModelFromUrdf(urdf)
+            found = pin.buildGeomFromUrdf(
+                model, urdf, pin.GeometryType.COLLISION, package_dirs=folders
+            )
+        except (ValueError, RuntimeError) as error:
+            reason = " ".join(f"{error} {complaints()}".split())
+            raise DikbenchError(f"robot file {urdf}: collision geometry: {reason}") from None
+    bodies = pin.GeometryModel()
+    for body in found.geometryObjects:
+        shape, placement = body.geometry, body.placement
+        if hasattr(shape, "vertices"):
+            vertices = np.asarray(shape.vertices()).reshape(-1, 3)  # scaled already
+            shape, within = capsule(*enclosing_capsule(vertices))
+            placement = placement * within
+        bodies.addGeometryObject(
+            pin.GeometryObject(body.name, body.parentJoint, body.parentFrame, placement, shape)
+        )
+    return model, bodies
+
+
+def _along_links(model: Any) -> Any:
+    bodies = pin.GeometryModel()
+    for joint in range(1, model.njoints):
+        for number, end in enumerate(_ends(model, joint)):
+            shape, placement = capsule(np.zeros(3), end, LINK_RADIUS)
+            name = f"{model.names[joint]}_{number}"
+            bodies.addGeometryObject(pin.GeometryObject(name, joint, placement, shape))
+    return bodies
+
+
+def _ends(model: Any, joint: int) -> list[Array]:
+    """Where the links of a joint end: at the next joints or, where there is none, at its frames."""
+    ends = [model.jointPlacements[child].translation for child in model.children[joint]]
+    if not ends:
+        ends = [
+            frame.placement.translation
+            for frame in model.frames
+            if frame.parentJoint == joint and frame.type == pin.FrameType.OP_FRAME
+        ]
+    kept: list[Array] = []
+    for end in ends:
+        if all(np.linalg.norm(end - other) > POINT for other in [np.zeros(3), *kept]):
+            kept.append(end)
+    return kept

@@ -1,0 +1,145 @@
+"""Pairs of bodies and obstacles: their distances at a configuration, and how the joints move them.
+
+    phi(q + dq) = phi + g . dq + O(|dq|^2),   g = dphi/dq = n^T (J_b - J_a)
+
+for a pair (a, b) with signed distance phi [m] (negative: how deep they are in each other), n the
+unit vector from a to b at the nearest points and J_a, J_b the Jacobians of these points of the two
+bodies, in the axes of the world. An obstacle does not move: J_b = 0.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.arrays import Array, Indices
+from dikbench.robots.collision.bodies import collision_bodies
+from dikbench.robots.collision.obstacles import Obstacle
+from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.robot import Robot
+
+TOLERANCE = 1e-10
+"""Of the iterative distances [m], those of cylinders and boxes: their nearest points are off by the
+root of it (coal's own 1e-6 leaves gradients with errors of 5e-3 m/rad)."""
+
+AFTER, BEFORE = [1, 2, 0], [2, 0, 1]
+"""Axes of a cross product."""
+
+
+class CollisionPairs:
+    """What of a robot must not touch what.
+
+    Bodies that move against each other are a pair, but those of one joint and the next, those that
+    the robot's SRDF rules out, and those that are nearer than `margin` [m] at the robot's safe
+    start: there the bodies are too coarse to say anything. Every moving body and every obstacle
+    are a pair, without exception.
+
+    Attributes:
+        names: of the two, pair by pair.
+        joints: that carry them, 0 for the world.
+        left_out: names of the pairs of bodies left out because of the safe start.
+    """
+
+    def __init__(
+        self, robot: Robot, obstacles: Sequence[Obstacle], margin: float, *, self_collision: bool
+    ) -> None:
+        self._robot = robot
+        self._geometry = collision_bodies(robot)
+        self.left_out: tuple[tuple[str, str], ...] = ()
+        bodies = list(self._geometry.geometryObjects)
+        if self_collision:
+            self._pair_bodies(bodies, margin)
+        for number, obstacle in enumerate(obstacles):
+            shape, placement = obstacle.geometry()
+            added = self._geometry.addGeometryObject(
+                pin.GeometryObject(f"obstacle_{number}", 0, placement, shape)
+            )
+            for index, body in enumerate(bodies):
+                if body.parentJoint != 0:
+                    self._geometry.addCollisionPair(pin.CollisionPair(index, added))
+        self.names = tuple(self._names(pair) for pair in self._geometry.collisionPairs)
+        objects = self._geometry.geometryObjects
+        self.joints: tuple[tuple[int, int], ...] = tuple(
+            (objects[pair.first].parentJoint, objects[pair.second].parentJoint)
+            for pair in self._geometry.collisionPairs
+        )
+        moved = _moved(robot.model)
+        self._signs = np.array([moved[b] - moved[a] for a, b in self.joints])
+        self._place()
+
+    def __len__(self) -> int:
+        """Number of pairs."""
+        return len(self.names)
+
+    def distances(self, kinematics: Kinematics) -> Array:
+        """Signed distances at a configuration, (p,) [m]."""
+        kinematics.place_bodies(self._geometry, self._placed)
+        pin.computeDistances(self._geometry, self._placed)
+        return np.array([result.min_distance for result in self._results])
+
+    def gradients(self, kinematics: Kinematics, pairs: Indices) -> Array:
+        """dphi/dq of some pairs, (k, nv) [m/rad or 1], at the configuration of `distances`.
+
+        Zero where the nearest points have no direction from each other (axes that cross).
+        """
+        results = [self._results[pair] for pair in pairs.tolist()]
+        # A unit force along n at the nearest points: they lie on its line, both of them.
+        wrenches = np.empty((len(results), 6))
+        n = wrenches[:, :3] = np.array([result.normal for result in results]).reshape(-1, 3)
+        points = np.array([result.getNearestPoint1() for result in results]).reshape(-1, 3)
+        wrenches[:, 3:] = points[:, AFTER] * n[:, BEFORE] - points[:, BEFORE] * n[:, AFTER]
+        gradients: Array = (wrenches @ kinematics.spatial_jacobian) * self._signs[pairs]
+        return gradients
+
+    def _pair_bodies(self, bodies: list[Any], margin: float) -> None:
+        model, geometry = self._robot.model, self._geometry
+        for (i, a), (j, b) in combinations(enumerate(bodies), 2):
+            joints = a.parentJoint, b.parentJoint
+            if joints[0] != joints[1] and not _adjacent(model, *joints):
+                geometry.addCollisionPair(pin.CollisionPair(i, j))
+        if self._robot.srdf:
+            pin.removeCollisionPairs(model, geometry, self._robot.srdf)
+        self._place()
+        kinematics = Kinematics(self._robot)
+        kinematics.update(self._robot.q0)
+        near = np.flatnonzero(self.distances(kinematics) < margin)
+        left_out = [pin.CollisionPair(p.first, p.second) for p in geometry.collisionPairs]
+        left_out = [left_out[index] for index in near]
+        self.left_out = tuple(self._names(pair) for pair in left_out)
+        for pair in left_out:
+            geometry.removeCollisionPair(pair)
+
+    def _place(self) -> None:
+        self._placed = self._geometry.createData()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)
+            for request in self._placed.distanceRequests:
+                request.gjk_tolerance = request.epa_tolerance = TOLERANCE
+                # A guess from the call before makes the last bits depend on it. The name is out of
+                # date, but the new one does not switch it off (coal 3.0).
+                request.enable_cached_gjk_guess = False
+        self._results = list(self._placed.distanceResults)
+
+    def _names(self, pair: Any) -> tuple[str, str]:
+        objects = self._geometry.geometryObjects
+        return objects[pair.first].name, objects[pair.second].name
+
+
+def _adjacent(model: Any, first: int, second: int) -> bool:
+    return first in (second, model.parents[second]) or second == model.parents[first]
+
+
+def _moved(model: Any) -> Array:
+    """Which velocities move the bodies of each joint: 1 or 0, (njoints, nv)."""
+    moved = np.zeros((model.njoints, model.nv))
+    for joint in range(1, model.njoints):
+        for support in model.supports[joint]:
+            carrier = model.joints[support]
+            if support:
+                moved[joint, carrier.idx_v : carrier.idx_v + carrier.nv] = 1.0
+    return moved

@@ -1,0 +1,182 @@
+"""The limits of a robot's joints, and how far one configuration is from them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from dikbench.arrays import Array, Indices
+from dikbench.errors import DikbenchError
+
+NO_LIMIT = 1e20
+"""Magnitudes above this mean "no limit": some models carry the largest double instead of inf."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Interval:
+    """A lower and an upper bound per joint, shape (nv,) each; infinite where there is none."""
+
+    lower: Array
+    upper: Array
+
+    def __post_init__(self) -> None:
+        """Keep laws from writing to limits that every later step and trial shares."""
+        for side in ("lower", "upper"):
+            bound = np.array(getattr(self, side), dtype=float)
+            bound.flags.writeable = False
+            object.__setattr__(self, side, bound)
+
+    def usage(self, values: Array) -> Array:
+        """Values (..., nv) over the bound on their own side; infinite past a bound of zero."""
+        bound = np.abs(np.where(values > 0, self.upper, self.lower))
+        with np.errstate(divide="ignore"):
+            share: Array = np.divide(
+                np.abs(values), bound, out=np.zeros_like(values), where=values != 0
+            )
+        return share
+
+
+@dataclass(frozen=True, eq=False)
+class JointLimits:
+    """What a robot's joints may do, in tangent coordinates; a kind not in force is None.
+
+    Attributes:
+        nv: number of velocities.
+        q_index: index into q of each velocity's coordinate, shape (nv,); -1 where the joint can
+            have no position limit (continuous joints, free-flyers).
+        position: bounds on that coordinate [rad or m], or None.
+        velocity: bounds [rad/s or m/s], or None.
+        acceleration: bounds [rad/s^2 or m/s^2], or None.
+        effort: bounds [N m or N], or None.
+    """
+
+    nv: int
+    q_index: Indices
+    position: Interval | None
+    velocity: Interval | None
+    acceleration: Interval | None
+    effort: Interval | None
+
+    def with_interval(self, kind: str, value: object) -> JointLimits:
+        """Replace one kind of limit.
+
+        Args:
+            kind: "position", "velocity", "acceleration" or "effort".
+            value: None (not in force), a magnitude for all joints or one per joint (symmetric),
+                or a pair (lower, upper) of such.
+
+        Raises:
+            DikbenchError: on a wrong shape, NaN, a lower bound above the upper one, (but for
+                positions) an interval that does not contain zero, or a finite position limit of
+                a joint that can have none.
+        """
+        if value is None:
+            return self._replaced(kind, None)
+        if isinstance(value, tuple):
+            if len(value) != 2:
+                raise DikbenchError(
+                    f"{kind} limit: a tuple means (lower, upper), got {len(value)} entries"
+                )
+            lower, upper = (self._vector(kind, side) for side in value)
+        else:
+            upper = self._vector(kind, value)
+            lower = -upper
+        if np.any(lower > upper):
+            raise DikbenchError(f"{kind} limit: a lower bound is above its upper bound")
+        if kind != "position" and (np.any(lower > 0) or np.any(upper < 0)):
+            raise DikbenchError(f"{kind} limit: every interval must contain zero (rest)")
+        limitless = (self.q_index < 0) & (np.isfinite(lower) | np.isfinite(upper))
+        if kind == "position" and limitless.any():
+            raise DikbenchError(
+                "position limit: continuous joints and free-flyers can have none; expected inf at "
+                f"{np.flatnonzero(limitless).tolist()}"
+            )
+        return self._replaced(kind, Interval(lower, upper))
+
+    def _replaced(self, kind: str, interval: Interval | None) -> JointLimits:
+        changed: dict[str, Any] = {kind: interval}
+        return replace(self, **changed)
+
+    def _vector(self, kind: str, value: object) -> Array:
+        try:
+            vector = np.asarray(value, dtype=float)
+            if vector.ndim == 0:
+                vector = np.full(self.nv, float(vector))
+        except (TypeError, ValueError):
+            raise DikbenchError(f"{kind} limit: expected numbers, got {value!r}") from None
+        if vector.shape != (self.nv,) or np.isnan(vector).any():
+            raise DikbenchError(
+                f"{kind} limit: expected a number or {self.nv} numbers without NaN, "
+                f"got shape {vector.shape}"
+            )
+        return np.where(np.abs(vector) > NO_LIMIT, np.copysign(np.inf, vector), vector)
+
+    @cached_property
+    def way_back(self) -> tuple[Array, Array] | None:
+        """Largest speeds at which a violated lower and upper position limit is left [rad/s].
+
+        A tenth of the velocity limit towards the inside; None where no velocity limit is in force.
+        """
+        if self.velocity is None:
+            return None
+        return 0.1 * self.velocity.upper, -0.1 * self.velocity.lower
+
+    @cached_property
+    def middle(self) -> Array | None:
+        """Middle of the position limits, (nv,) [rad or m], NaN where a joint has not both.
+
+        None where position limits are not in force.
+        """
+        if self.position is None:
+            return None
+        lower, upper = self.position.lower, self.position.upper
+        limited = np.isfinite(lower) & np.isfinite(upper)
+        middle = np.full(self.nv, np.nan)
+        middle[limited] = (lower[limited] + upper[limited]) / 2
+        middle.flags.writeable = False
+        return middle
+
+    def at(self, q: Array) -> Limits:
+        """The limits as seen from configuration q (nq,)."""
+        if self.position is None:
+            return Limits(self, None)
+        return Limits(self, q if self._coordinates_are_q else q[self.q_index])
+
+    @cached_property
+    def _coordinates_are_q(self) -> bool:
+        """Whether q_index is 0, 1, 2, ...: q itself then serves, without a copy."""
+        return bool(np.array_equal(self.q_index, np.arange(self.nv)))
+
+
+class Limits(msgspec.Struct, eq=False):
+    """What the robot may do here: the limits of its joints as seen from one configuration.
+
+    Attributes:
+        joint: the limits in force (velocity, acceleration, effort).
+        coordinates: the coordinate of each velocity that position limits bound [rad or m], (nv,);
+            None where position limits are not in force.
+    """
+
+    joint: JointLimits
+    coordinates: Array | None
+
+    @property
+    def to_lower(self) -> Array | None:
+        """Distance to the lower position limits in the tangent space, q - q_min [rad or m], (nv,).
+
+        Negative outside; None where position limits are not in force.
+        """
+        if self.coordinates is None or self.joint.position is None:
+            return None
+        return self.coordinates - self.joint.position.lower
+
+    @property
+    def to_upper(self) -> Array | None:
+        """Likewise q_max - q."""
+        if self.coordinates is None or self.joint.position is None:
+            return None
+        return self.joint.position.upper - self.coordinates

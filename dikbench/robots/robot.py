@@ -1,0 +1,202 @@
+"""A robot: a Pinocchio model with its task frame, its limits and a safe start."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+
+from dikbench.arrays import Array, Indices
+from dikbench.errors import DikbenchError, unknown
+from dikbench.robots.limits import NO_LIMIT, Interval, JointLimits
+
+UNCHANGED: Final[Any] = object()
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A robot model as the harness and the laws see it.
+
+    Attributes:
+        name: the name under which it was loaded.
+        model: the Pinocchio model, fingers and other passive joints locked.
+        frame: name of the task frame, in which twists are expressed.
+        limits: the limits of the joints that are in force.
+        q0: a safe start, shape (nq,): inside the limits, away from singularities.
+        task_rows: the rows of the body twist (linear; angular) that the arm can move at all: all
+            six in space, (0, 1, 5) for an arm in the x-y plane. Tasks on the pose keep to them.
+        available_acceleration: acceleration limits [rad/s^2] known for this robot, shape (nv,),
+            in force only where a scenario or `with_limits` says so; None where none are known.
+        visuals: builds what is drawn of it (`pinocchio.GeometryModel`), which may raise ValueError
+            where a mesh is missing; None where there is only the chain of joints.
+        urdf: the file of the model, which has its collision geometry; None: built in code.
+        srdf: the file that says which links cannot collide, if there is one.
+    """
+
+    name: str
+    model: Any
+    frame: str
+    limits: JointLimits
+    q0: Array
+    task_rows: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
+    available_acceleration: Array | None = None
+    visuals: Callable[[], Any] | None = None
+    urdf: str | None = None
+    srdf: str | None = None
+
+    def __post_init__(self) -> None:
+        """Keep laws from writing to the start, which every later trial shares."""
+        start = np.array(self.q0, dtype=float)
+        start.flags.writeable = False
+        object.__setattr__(self, "q0", start)
+
+    @cached_property
+    def frame_id(self) -> int:
+        """Pinocchio's index of the task frame."""
+        return frame_id(self.model, self.frame)
+
+    @cached_property
+    def available_effort(self) -> Array:
+        """The model's effort limits, (nv,) [N m or N], infinite where it has none.
+
+        In force only where a scenario or `with_limits(effort=...)` says so.
+        """
+        return _symmetric(self.model.effortLimit).upper
+
+    @cached_property
+    def scratch(self) -> Any:
+        """A `pinocchio.Data` of its own for laws that need more than the task Jacobian."""
+        return self.model.createData()
+
+    @cached_property
+    def nq(self) -> int:
+        """Number of configuration coordinates."""
+        return int(self.model.nq)
+
+    @cached_property
+    def nv(self) -> int:
+        """Number of velocities."""
+        return int(self.model.nv)
+
+    @cached_property
+    def chain(self) -> Indices:
+        """The velocities (indices into v) that move the task frame: not those of a gripper."""
+        model = self.model
+        carrying = model.supports[model.frames[self.frame_id].parentJoint]
+        moved = [
+            range(joint.idx_v, joint.idx_v + joint.nv)
+            for joint in (model.joints[index] for index in carrying)
+            if joint.idx_v >= 0
+        ]
+        return np.array([index for indices in moved for index in indices], dtype=np.intp)
+
+    def reach_of(self, placement: Any) -> float:
+        """Distance [m] of a placement (`pinocchio.SE3`) from the origin of the first joint."""
+        first = self.model.jointPlacements[1].translation
+        return float(np.linalg.norm(placement.translation - first))
+
+    def with_limits(
+        self,
+        *,
+        position: object = UNCHANGED,
+        velocity: object = UNCHANGED,
+        acceleration: object = UNCHANGED,
+        effort: object = UNCHANGED,
+    ) -> Robot:
+        """The same robot with other limits in force.
+
+        Args:
+            position: None (not in force) or a pair (lower, upper) [rad or m].
+            velocity: None, a magnitude, one per joint, or a pair (lower, upper) [rad/s].
+            acceleration: likewise [rad/s^2].
+            effort: likewise [N m].
+
+        Raises:
+            DikbenchError: on a wrong shape, NaN, or bounds that exclude rest.
+        """
+        limits = self.limits
+        given = {
+            "position": position,
+            "velocity": velocity,
+            "acceleration": acceleration,
+            "effort": effort,
+        }
+        for kind, value in given.items():
+            if value is not UNCHANGED:
+                limits = limits.with_interval(kind, value)
+        return replace(self, limits=limits)
+
+    def configuration(self, q: object, what: str = "q") -> Array:
+        """Check a configuration that came from outside and return it as an array (nq,).
+
+        Raises:
+            DikbenchError: on a wrong shape, NaN or infinity.
+        """
+        return checked_vector(q, self.nq, what)
+
+
+def frame_id(model: Any, frame: str) -> int:
+    """Index of a frame of a model.
+
+    Raises:
+        DikbenchError: if the model has no frame of this name.
+    """
+    if not model.existFrame(frame):
+        frames = sorted({f.name for f in model.frames} - {"universe"})
+        raise unknown("frame", frame, frames, f"of robot {model.name!r}")
+    return int(model.getFrameId(frame))
+
+
+def checked_vector(value: object, size: int, what: str) -> Array:
+    """A finite vector of the given size, copied.
+
+    Raises:
+        DikbenchError: if it is anything else.
+    """
+    try:
+        vector = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise DikbenchError(f"{what}: expected {size} numbers, got {value!r}") from None
+    if vector.shape != (size,):
+        raise DikbenchError(f"{what}: expected shape ({size},), got {vector.shape}")
+    if not np.isfinite(vector).all():
+        raise DikbenchError(f"{what}: expected finite numbers, got {vector.tolist()}")
+    return vector
+
+
+def model_limits(model: Any) -> JointLimits:
+    """Read position, velocity and effort limits off a Pinocchio model.
+
+    Joints with one coordinate and one velocity have position limits; continuous joints, planar
+    joints and free-flyers have none (the artificial bounds that some models carry are dropped).
+    A velocity or effort limit of zero means that the model does not say.
+    """
+    nv = model.nv
+    q_index = np.full(nv, -1)
+    lower, upper = np.full(nv, -np.inf), np.full(nv, np.inf)
+    for joint in model.joints:
+        # The first one is the universe, which calls itself a revolute joint with index -1.
+        if joint.idx_v >= 0 and joint.nq == 1 and joint.nv == 1:
+            q_index[joint.idx_v] = joint.idx_q
+            lower[joint.idx_v] = model.lowerPositionLimit[joint.idx_q]
+            upper[joint.idx_v] = model.upperPositionLimit[joint.idx_q]
+    lower[np.abs(lower) > NO_LIMIT] = -np.inf
+    upper[np.abs(upper) > NO_LIMIT] = np.inf
+    return JointLimits(
+        nv=nv,
+        q_index=q_index,
+        position=Interval(lower, upper),
+        velocity=_symmetric(model.velocityLimit),
+        acceleration=None,
+        effort=_symmetric(model.effortLimit),
+    )
+
+
+def _symmetric(magnitude: Array) -> Interval:
+    # Pinocchio 4.1 fills lowerVelocityLimit of a URDF with the positive magnitude: not read.
+    upper = np.array(magnitude, dtype=float)
+    upper[(upper == 0) | (upper > NO_LIMIT)] = np.inf
+    return Interval(-upper, upper)

@@ -1,0 +1,173 @@
+"""What a worker process does: build a trial, run it, measure it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from time import perf_counter
+from typing import Any, Literal
+
+from dikbench.errors import DikbenchError
+from dikbench.metrics import evaluate
+from dikbench.metrics.motion import recompute
+from dikbench.plugins.registry import make_formulation, make_plant, make_scenario
+from dikbench.problem.problem import program_of
+from dikbench.run.provenance import environment
+from dikbench.run.worker_process import calm_down
+from dikbench.scenario.oracle import ORACLE
+from dikbench.scenario.scenario import Scenario
+from dikbench.simulation.closed_loop import ReferenceMode, simulate
+from dikbench.simulation.oracle_law import replay_of
+from dikbench.simulation.status import Status
+from dikbench.solvers.catalogue.back_ends import parse_solver
+from dikbench.solvers.checked_solve import CheckedSolve, make_solve
+from dikbench.study.trial import NO_SOLVER, Trial
+
+Row = dict[str, Any]
+"""One trial as it stands in the table: column -> value."""
+
+TracePolicy = Literal["all", "failures", "none"]
+
+
+class CannotStore(DikbenchError):
+    """A trace cannot be written: the run has to end, with what is committed."""
+
+
+@lru_cache(maxsize=32)
+def scenario_of(selector: str, seed: int) -> Scenario:
+    """The scenario of a trial, built once per process."""
+    return make_scenario(selector, seed)
+
+
+def solve_of(formulation: str, solver: str, *, checks: bool = True) -> CheckedSolve:
+    """A fresh `solve` for a law and a solver, both given by their selectors."""
+    program = program_of(make_formulation(formulation))
+    named = None if solver == NO_SOLVER else parse_solver(solver)
+    return make_solve(named, program, checks=checks)
+
+
+def header(trial: Trial) -> Row:
+    """The columns that say which trial a row is of."""
+    return {
+        "formulation": trial.formulation,
+        "solver": trial.solver,
+        "scenario": trial.scenario,
+        "plant": trial.plant,
+        "reference": trial.reference,
+        "seed": trial.seed,
+    }
+
+
+def row_without_run(trial: Trial, status: Status, message: str) -> Row:
+    """The row of a trial of which nothing can be measured."""
+    return {**header(trial), "status": status.value, "message": message, "steps": 0}
+
+
+@lru_cache(maxsize=4)
+def _environment(commit: str | None, command: str) -> Row:
+    return environment(commit, command)
+
+
+def work(
+    trial: Trial, trace: Path, policy: TracePolicy, commit: str | None, command: str
+) -> tuple[Row, Row]:
+    """Run a trial in a worker process, whatever its plug-ins do.
+
+    Args:
+        trial: the cell.
+        trace: file for its trace.
+        policy: whether the trace is kept.
+        commit: see `environment`.
+        command: see `environment`.
+
+    Returns:
+        Its row, and the description of this process.
+
+    Raises:
+        CannotStore: if the trace cannot be written.
+    """
+    calm_down()
+    try:
+        row = run_trial(trial, trace, policy)
+    except CannotStore:
+        raise
+    except MemoryError as error:
+        row = row_without_run(trial, Status.OUT_OF_MEMORY, f"out of memory: {error}".rstrip(": "))
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}".partition("\n")[0]
+        row = row_without_run(trial, Status.FORMULATION_ERROR, reason)
+    except BaseException as error:  # such as SystemExit
+        reason = f"the law asked the process to end: {type(error).__name__}"
+        row = row_without_run(trial, Status.CRASHED, reason)
+    calm_down()
+    return row, _environment(commit, command)
+
+
+def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "all") -> Row:
+    """Run one trial.
+
+    Args:
+        trial: the cell.
+        trace: file for its trace, or None.
+        policy: whether it is kept.
+
+    Returns:
+        Its row: keys, status, message, number of steps, every metric; `wall_time_s` of the run and
+        of it `control_time_s`, in kinematics, law and solver (the rest is the harness's).
+
+    Raises:
+        CannotStore: if the trace cannot be written.
+    """
+    try:
+        scenario = scenario_of(trial.scenario, trial.seed)
+    except DikbenchError as error:
+        return row_without_run(trial, Status.SKIPPED, str(error))
+    if trial.reference == "path" and not scenario.reference.moving:
+        reason = "the scenario has no path that could wait for the robot"
+        return row_without_run(trial, Status.SKIPPED, reason)
+    oracle = trial.formulation == ORACLE
+    if oracle and scenario.oracle is None:
+        reason = "no joint motion does what the scenario asks for"
+        return row_without_run(trial, Status.SKIPPED, reason)
+    plant = make_plant(trial.plant)
+    mode: ReferenceMode = "path" if trial.reference == "path" else "time"
+    start = perf_counter()
+    run = simulate(
+        scenario,
+        replay_of(scenario) if oracle else make_formulation(trial.formulation),
+        make_solve(None, None) if oracle else solve_of(trial.formulation, trial.solver),
+        plant,
+        mode,
+        trial.seed,
+    )
+    if trace is not None and (
+        policy == "all" or (policy == "failures" and run.status is not Status.OK)
+    ):
+        _keep(run.trace.save, trace)
+    metrics: Mapping[str, float] = {}
+    if run.trace.steps:
+        seen = None if plant.noise else run.jacobians  # with noise, not those of the true motion
+        metrics = evaluate(recompute(run.trace, scenario, seen))
+    return {
+        **header(trial),
+        "status": run.status.value,
+        "message": run.message,
+        "steps": run.trace.steps,
+        **metrics,
+        "wall_time_s": perf_counter() - start,
+        "control_time_s": (run.kinematics_ns + run.law_ns) / 1e9,
+    }
+
+
+def _keep(save: Any, path: Path) -> None:
+    """Write a trace in one move."""
+    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
+    try:
+        save(partial)
+        partial.replace(path)
+    except OSError as error:
+        partial.unlink(missing_ok=True)
+        reason = error.strerror or str(error)
+        raise CannotStore(f"trace {path} cannot be written: {reason}") from None

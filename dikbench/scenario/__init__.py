@@ -1,0 +1,130 @@
+"""A closed-loop case, and all that the author of a family imports.
+
+Robots, references, tasks and constraints to build a scenario from; the exact joint motion on which
+its certificate is measured; what a seed perturbs.
+"""
+
+from __future__ import annotations
+
+from dikbench.arrays import Array, Mask
+from dikbench.linear_algebra import damped_least_squares, null_space
+from dikbench.problem.constraints import CollisionConstraint, Constraint, TorqueConstraint
+from dikbench.problem.constraints.torque import effort_limits
+from dikbench.problem.tasks import (
+    CentreOfMassTask,
+    OrientationTask,
+    PoseTask,
+    PositionTask,
+    PostureTask,
+    Task,
+    TrackingTask,
+    TrackingTogether,
+)
+from dikbench.robots.catalogue import load_robot
+from dikbench.robots.collision.obstacles import (
+    BoxObstacle,
+    CapsuleObstacle,
+    Obstacle,
+    SphereObstacle,
+)
+from dikbench.robots.kinematics import Kinematics, smallest_singular_value
+from dikbench.robots.payload import with_payload
+from dikbench.robots.robot import Robot
+from dikbench.scenario.building import (
+    POSTURE_WEIGHT,
+    between,
+    duration_at,
+    influence_distance,
+    least_norm_share,
+    limits_in_force,
+    placement_of,
+    positive,
+    samples,
+    secondary_tasks,
+    start_velocity,
+)
+from dikbench.scenario.certificate import Certificate, Claim
+from dikbench.scenario.oracle import (
+    OracleMotion,
+    joint_oracle,
+    measure_motion,
+    oracle_motion,
+    solve_placement,
+)
+from dikbench.scenario.reference.curves import circle, lemniscate, plane_of
+from dikbench.scenario.reference.pose_file import PoseFile, read_poses
+from dikbench.scenario.reference.reference import Reference, joint_path, screw_path, target_at_rest
+from dikbench.scenario.reference.waypoints import through
+from dikbench.scenario.scenario import Scenario
+from dikbench.scenario.singularity import (
+    Kind,
+    Singularity,
+    analyse,
+    make_singular,
+    singular_postures,
+)
+from dikbench.scenario.variation import Perturbation, Variation
+
+__all__ = [
+    "POSTURE_WEIGHT",
+    "Array",
+    "BoxObstacle",
+    "CapsuleObstacle",
+    "CentreOfMassTask",
+    "Certificate",
+    "Claim",
+    "CollisionConstraint",
+    "Constraint",
+    "Kind",
+    "Kinematics",
+    "Mask",
+    "Obstacle",
+    "OracleMotion",
+    "OrientationTask",
+    "Perturbation",
+    "PoseFile",
+    "PoseTask",
+    "PositionTask",
+    "PostureTask",
+    "Reference",
+    "Robot",
+    "Scenario",
+    "Singularity",
+    "SphereObstacle",
+    "Task",
+    "TorqueConstraint",
+    "TrackingTask",
+    "TrackingTogether",
+    "Variation",
+    "analyse",
+    "between",
+    "circle",
+    "damped_least_squares",
+    "duration_at",
+    "effort_limits",
+    "influence_distance",
+    "joint_oracle",
+    "joint_path",
+    "least_norm_share",
+    "lemniscate",
+    "limits_in_force",
+    "load_robot",
+    "make_singular",
+    "measure_motion",
+    "null_space",
+    "oracle_motion",
+    "placement_of",
+    "plane_of",
+    "positive",
+    "read_poses",
+    "samples",
+    "screw_path",
+    "secondary_tasks",
+    "singular_postures",
+    "smallest_singular_value",
+    "solve_placement",
+    "start_velocity",
+    "target_at_rest",
+    "through",
+    "with_payload",
+]

@@ -1,0 +1,175 @@
+"""The joint motion that follows a reference exactly, limits or not: the measure of scenarios."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.arrays import Array
+from dikbench.errors import DikbenchError
+from dikbench.problem.tasks import PoseTask, TrackingTask
+from dikbench.robots.kinematics import Kinematics, smallest_singular_value
+from dikbench.robots.robot import Robot
+from dikbench.scenario.reference.reference import Reference
+
+ORACLE = "oracle"
+"""What stands in the place of the law where the joint motion itself is scored."""
+
+POSE = PoseTask()
+
+
+@dataclass(frozen=True, eq=False)
+class OracleMotion:
+    """A joint motion sampled along a reference, and what it asks of the robot.
+
+    Attributes:
+        instants: nominal times of the samples, (k + 1,) [s].
+        q: configurations, (k + 1, nq).
+        v: velocities between them at nominal speed, (k, nv) [rad/s].
+        sigma_min: smallest singular value of the task Jacobian (m, rad), (k + 1,).
+        speed_ratio: largest |v| over its limit, (k,).
+        margin: smallest distance to a position limit [rad], negative outside, (k + 1,).
+        reach: distance of the task frame from the first joint [m], (k + 1,).
+        exact: the configuration at any nominal time, where it is known in closed form.
+    """
+
+    instants: Array
+    q: Array
+    v: Array
+    sigma_min: Array
+    speed_ratio: Array
+    margin: Array
+    reach: Array
+    exact: Callable[[float], Array] | None = None
+
+    @property
+    def peak_speed_ratio(self) -> float:
+        """Largest joint speed over its limit."""
+        return float(self.speed_ratio.max(initial=0.0))
+
+
+def solve_placement(
+    robot: Robot,
+    target: Any,
+    seed: Array,
+    *,
+    tracking: TrackingTask = POSE,
+    iterations: int = 200,
+) -> Array:
+    """A configuration that does a tracking task, by damped Gauss-Newton from `seed`.
+
+    Steps are Levenberg-Marquardt with damping by the squared error (Sugihara 2011), at most 0.3 rad
+    each; position limits are not looked at.
+
+    Args:
+        robot: the robot.
+        target: where the task frame is to be (`pinocchio.SE3`).
+        seed: configuration to start from, (nq,).
+        tracking: the task; default: the whole pose.
+        iterations: largest number of steps.
+
+    Raises:
+        DikbenchError: if the residual (m, rad) does not fall below 1e-9.
+    """
+    kinematics = Kinematics(robot)
+    q = seed
+    error = np.inf
+    for _ in range(iterations):
+        kinematics.update(q)
+        task = tracking.linearize(kinematics, target)
+        e, J = task.error, task.J
+        before, error = error, float(np.linalg.norm(e))
+        if error < 1e-12 or (error < 1e-9 and error >= before):
+            return q  # there, or as near as rounding lets it come
+        H = J.T @ J
+        H.flat[:: len(H) + 1] += 0.1 * error**2 + 1e-12
+        step = np.linalg.solve(H, J.T @ e)
+        largest = float(np.abs(step).max())
+        q = pin.integrate(robot.model, q, step * min(1.0, 0.3 / max(largest, 1e-300)))
+    raise DikbenchError(
+        f"robot {robot.name}: no posture found for the placement, residual {error:.2g}"
+    )
+
+
+def follow(
+    robot: Robot, reference: Reference, q0: Array, instants: Array, tracking: TrackingTask = POSE
+) -> Array:
+    """Configurations (k + 1, nq) that follow a reference exactly from q0 on.
+
+    Each is solved from the one before it, in the least-norm way where the arm has a null space.
+
+    Args:
+        robot: the robot.
+        reference: the path.
+        q0: configuration at the first instant, (nq,).
+        instants: nominal times, (k + 1,) [s].
+        tracking: what is to be followed.
+
+    Raises:
+        DikbenchError: if a sample cannot be reached.
+    """
+    q = [q0]
+    for tau in instants[1:]:
+        q.append(solve_placement(robot, reference.placement(tau), q[-1], tracking=tracking))
+    return np.array(q)
+
+
+def oracle_motion(
+    robot: Robot, reference: Reference, q0: Array, instants: Array, tracking: TrackingTask = POSE
+) -> OracleMotion:
+    """Follow a reference exactly from q0 and measure the motion (see `follow`)."""
+    q = follow(robot, reference, q0, instants, tracking)
+    return measure_motion(robot, instants, q, tracking)
+
+
+def joint_oracle(
+    robot: Robot,
+    configuration: Callable[[float], Array],
+    instants: Array,
+    tracking: TrackingTask = POSE,
+) -> OracleMotion:
+    """Measure a joint motion that is known in closed form: tau [s] -> q (nq,)."""
+    q = np.array([configuration(tau) for tau in instants])
+    return measure_motion(robot, instants, q, tracking, configuration)
+
+
+def measure_motion(
+    robot: Robot,
+    instants: Array,
+    q: Array,
+    tracking: TrackingTask = POSE,
+    exact: Callable[[float], Array] | None = None,
+) -> OracleMotion:
+    """Measure a joint motion (k + 1, nq) at its instants (k + 1,) [s] (see `OracleMotion`)."""
+    model, rows = robot.model, np.array(tracking.rows(robot))
+    periods = np.diff(instants)
+    v = np.array(
+        [pin.difference(model, q[k], q[k + 1]) / period for k, period in enumerate(periods)]
+    ).reshape(len(periods), robot.nv)
+    kinematics = Kinematics(robot)
+    sigma, margin, reach = [], [], []
+    for sample in q:
+        kinematics.update(sample)
+        sigma.append(smallest_singular_value(kinematics.jacobian(robot.frame_id)[rows]))
+        margin.append(position_margin(robot, sample))
+        reach.append(robot.reach_of(kinematics.placement(robot.frame_id)))
+    limit = robot.limits.velocity
+    ratio = np.zeros(len(v)) if limit is None else limit.usage(v).max(axis=1)
+    return OracleMotion(
+        instants, q, v, np.array(sigma), ratio, np.array(margin), np.array(reach), exact
+    )
+
+
+def position_margin(robot: Robot, q: Array) -> float:
+    """Smallest distance [rad] of a configuration (nq,) to a position limit, negative outside.
+
+    Of the joints that move the task frame.
+    """
+    limits, chain = robot.limits.at(q), robot.chain
+    if limits.to_lower is None or limits.to_upper is None:
+        return float("inf")
+    return float(min(limits.to_lower[chain].min(), limits.to_upper[chain].min()))

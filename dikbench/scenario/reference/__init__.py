@@ -1,0 +1,1 @@
+"""What the task frame is to do: references, curves, waypoints, pose files."""

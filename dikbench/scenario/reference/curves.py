@@ -1,0 +1,122 @@
+"""Closed curves in a plane, run round at a constant rate: circle and lemniscate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.arrays import Array
+from dikbench.robots.robot import Robot
+from dikbench.scenario.reference.reference import Reference
+
+UPRIGHT: Final = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+"""The world's y-z plane: its two axes as columns, (3, 2)."""
+
+FLAT: Final = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
+"""The world's x-y plane, that of the planar arms."""
+
+
+def plane_of(robot: Robot) -> Array:
+    """The plane in which a robot's curves lie, (3, 2)."""
+    return UPRIGHT if 2 in robot.task_rows else FLAT
+
+
+def circle(
+    start: Any,
+    radius: float,
+    period: float,
+    laps: float,
+    *,
+    plane: Array = UPRIGHT,
+    turn: float = 0.0,
+) -> Reference:
+    """A circle through `start`, its point with the smallest second coordinate.
+
+        p = p_0 + P radius (sin w tau, 1 - cos w tau),   w = 2 pi / period
+
+    Args:
+        start: placement at tau = 0.
+        radius: [m].
+        period: nominal time of a lap [s].
+        laps: number of laps.
+        plane: P, the axes of its plane as columns, (3, 2).
+        turn: the frame turns about the normal of the plane by turn sin w tau [rad].
+    """
+    return _curve(
+        start,
+        lambda angle: radius * np.array([np.sin(angle), 1 - np.cos(angle)]),
+        lambda angle: radius * np.array([np.cos(angle), np.sin(angle)]),
+        period,
+        laps,
+        plane,
+        turn,
+    )
+
+
+def lemniscate(
+    start: Any,
+    size: float,
+    period: float,
+    laps: float,
+    *,
+    plane: Array = UPRIGHT,
+    turn: float = 0.0,
+) -> Reference:
+    """A figure of eight that crosses itself in `start`.
+
+        p = p_0 + P size (sin w tau, sin(2 w tau) / 2),   w = 2 pi / period
+
+    Args:
+        start: placement at tau = 0.
+        size: half its width, twice its height [m].
+        period: nominal time of a lap [s].
+        laps: number of laps.
+        plane: P, the axes of its plane as columns, (3, 2).
+        turn: the frame turns about the normal of the plane by turn sin w tau [rad].
+    """
+    return _curve(
+        start,
+        lambda angle: size * np.array([np.sin(angle), np.sin(2 * angle) / 2]),
+        lambda angle: size * np.array([np.cos(angle), np.cos(2 * angle)]),
+        period,
+        laps,
+        plane,
+        turn,
+    )
+
+
+def _curve(
+    start: Any,
+    offset: Callable[[float], Array],
+    tangent: Callable[[float], Array],
+    period: float,
+    laps: float,
+    plane: Array,
+    turn: float,
+) -> Reference:
+    """A curve given by its offset from `start` at an angle, (2,) [m], and the derivative of it."""
+    first: Array = start.rotation.copy()
+    origin = start.translation.copy()
+    normal = np.cross(plane[:, 0], plane[:, 1])
+    rate = 2 * np.pi / period
+
+    def rotation(angle: float) -> Array:
+        if turn == 0:
+            return first  # to the last bit
+        turned: Array = pin.exp3(turn * np.sin(angle) * normal) @ first
+        return turned
+
+    def placement(tau: float) -> Any:
+        angle = rate * tau
+        return pin.SE3(rotation(angle), origin + plane @ offset(angle))
+
+    def velocity(tau: float) -> Array:
+        angle = rate * tau
+        world = np.array([plane @ tangent(angle), turn * np.cos(angle) * normal])
+        twist: Array = rate * (world @ rotation(angle)).ravel()
+        return twist
+
+    return Reference(laps * period, placement, velocity, period=period)

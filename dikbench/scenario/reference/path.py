@@ -1,0 +1,171 @@
+"""The path of a reference: the way of its origin, as a chain of straight pieces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from dikbench.arrays import Array, Indices
+from dikbench.problem.progress import DWELL
+from dikbench.scenario.reference.reference import Reference
+
+CHORD: Final = 1e-6
+"""How far a straight piece may be from the curve that it stands for [m], about."""
+
+LONGEST_PIECE: Final = 5e-3
+"""Pieces are joined up to this length [m], where the path is straight enough."""
+
+FINEST: Final = 16
+"""Into so many samples, at most, a control period is divided."""
+
+NO_WAY: Final = 1e-9
+"""A path, or a step along it, that is shorter than this is a point [m]."""
+
+NEIGHBOURS: Final = 3
+"""So many of the nearest vertices are looked at to begin with."""
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """The path of a reference's origin from the first nominal time to the last.
+
+    Attributes:
+        times: nominal times of its samples, increasing, (f,) [s].
+        arcs: length of the way from the start to them, (f,) [m].
+        moving_times: nominal time spent until then on the way, without that in which the reference
+            rests or is slower than 1e-4 m/s, (f,) [s].
+        vertices: ends of the straight pieces, (k + 1, 3) [m].
+        vertex_arcs: length of the way to them, increasing, (k + 1,) [m].
+        once: number of the first pieces that hold the path as a set; those of a periodic one repeat
+            them.
+    """
+
+    times: Array
+    arcs: Array
+    moving_times: Array
+    vertices: Array
+    vertex_arcs: Array
+    once: int
+
+    @property
+    def is_point(self) -> bool:
+        """Whether the origin of the reference stays where it is."""
+        return len(self.vertices) == 1
+
+    @cached_property
+    def pieces(self) -> Array:
+        """Vectors from each vertex to the next, (k, 3) [m]."""
+        return np.diff(self.vertices, axis=0)
+
+    @cached_property
+    def squares(self) -> Array:
+        """Square lengths of the pieces, (k,) [m^2]."""
+        lengths: Array = np.einsum("ij,ij->i", self.pieces, self.pieces)
+        return lengths
+
+    def distances(self, points: Array) -> Array:
+        """Distance of points (n, 3) [m] from the path as a set, (n,) [m]; exact to `CHORD`."""
+        if self.is_point:
+            away: Array = np.linalg.norm(points - self.vertices[0], axis=1)
+            return away
+        tree, half = self._tree
+        nearest, open_, count = np.full(len(points), np.inf), np.arange(len(points)), NEIGHBOURS
+        while len(open_):
+            count = min(count, tree.n)
+            there, vertices = tree.query(points[open_], count)
+            there, vertices = there.reshape(-1, count), vertices.reshape(-1, count)
+            pieces = np.stack([np.maximum(vertices - 1, 0), np.minimum(vertices, self.once - 1)])
+            squares = [self.feet(points[open_, None], each)[1] for each in pieces]
+            nearest[open_] = np.sqrt(np.min(squares, axis=(0, 2)))
+            if count == tree.n:
+                break
+            # A piece that was not looked at ends in vertices that are farther than these.
+            floor = np.sqrt(np.maximum(there[:, -1] ** 2 - half**2, 0.0))
+            open_ = open_[nearest[open_] > floor + CHORD]
+            count *= 4
+        return nearest
+
+    @cached_property
+    def _tree(self) -> tuple[Any, float]:
+        """The vertices of the path as a set, and half the length of its longest piece [m]."""
+        lengths = np.linalg.norm(self.pieces[: self.once], axis=1)
+        return cKDTree(self.vertices[: self.once + 1]), float(lengths.max()) / 2
+
+    def feet(self, points: Array, pieces: Indices) -> tuple[Array, Array]:
+        """The nearest point of a piece for each point: share of its length, square distance.
+
+        Args:
+            points: (..., 3) [m].
+            pieces: the number of a piece for each, (...).
+
+        Returns:
+            Two arrays (...): 0 at the piece's start to 1 at its end, and [m^2].
+        """
+        away, along = points - self.vertices[pieces], self.pieces[pieces]
+        share = np.einsum("...i,...i->...", away, along)
+        share /= self.squares[pieces]
+        np.clip(share, 0.0, 1.0, out=share)
+        away -= share[..., None] * along
+        return share, np.einsum("...i,...i->...", away, away)
+
+
+def path_of(reference: Reference, end: float, dt: float) -> Path:
+    """The path of a moving reference up to a nominal time [s], sampled at dt [s] or finer.
+
+    Pieces are as long as they can be: within `CHORD` of the samples, or `LONGEST_PIECE`.
+    """
+    times, points = _samples(reference, end, dt)
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    arcs = np.concatenate([[0.0], np.cumsum(steps)])
+    spans = np.diff(times)
+    moving_times = np.concatenate([[0.0], np.cumsum(np.where(steps > DWELL * spans, spans, 0.0))])
+    kept = _simplified(points, steps, arcs)
+    vertex_arcs = arcs[kept]
+    lap = np.interp(reference.first_lap + reference.period, times, arcs)
+    once = max(1, min(int(np.searchsorted(vertex_arcs, lap)), len(kept) - 1))
+    return Path(times, arcs, moving_times, points[kept], vertex_arcs, once)
+
+
+def _samples(reference: Reference, end: float, dt: float) -> tuple[Array, Array]:
+    """Times (f,) [s] and points (f, 3) [m] whose connection is within `CHORD` of the path."""
+
+    def at(times: Array) -> Array:
+        points = [reference.placement(tau).translation for tau in times.tolist()]
+        return np.array(points).reshape(-1, 3)
+
+    times = np.linspace(0.0, end, max(2, int(np.ceil(end / dt))) + 1)
+    points = at(times)
+    bends = np.linalg.norm(np.diff(points, 2, axis=0), axis=1) / 8  # how far the chord is off
+    worst = np.maximum(np.append(bends, 0.0), np.insert(bends, 0, 0.0))
+    parts = np.clip(np.ceil(np.sqrt(worst / CHORD)), 1, FINEST).astype(int)
+    first = np.cumsum(parts) - parts
+    share = (np.arange(parts.sum()) - np.repeat(first, parts)) / np.repeat(parts, parts)
+    finer = np.append(np.repeat(times[:-1], parts) + share * (times[1] - times[0]), end)
+    filled = np.empty((len(finer), 3))
+    known = np.append(share == 0, True)
+    filled[known] = points
+    filled[~known] = at(finer[~known])
+    return finer, filled
+
+
+def _simplified(points: Array, steps: Array, arcs: Array) -> Indices:
+    """The samples that stay vertices: the first, the last, and those between that are needed."""
+    moved = np.concatenate([[0], np.flatnonzero(steps > NO_WAY) + 1])
+    if len(moved) == 1:
+        return moved
+    directions = np.diff(points[moved], axis=0)
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    turns = [*np.linalg.norm(np.diff(directions, axis=0), axis=1).tolist(), 0.0]
+    lengths = arcs[moved].tolist()
+    kept, turned = [0], 0.0
+    for k in range(1, len(moved) - 1):
+        turned += turns[k - 1]
+        length = lengths[k + 1] - lengths[kept[-1]]
+        if length > LONGEST_PIECE or length * turned > 8 * CHORD:
+            kept.append(k)
+            turned = 0.0
+    return moved[[*kept, len(moved) - 1]]

@@ -1,0 +1,117 @@
+"""A scenario: a robot, a start, a reference motion, limits in force, and a certificate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.arrays import Array
+from dikbench.problem.constraints import Constraint
+from dikbench.problem.tasks import Task, TrackingTask, TrackingTogether
+from dikbench.robots.robot import Robot
+from dikbench.scenario.certificate import Certificate
+from dikbench.scenario.oracle import OracleMotion, follow
+from dikbench.scenario.reference.path import Path, path_of
+from dikbench.scenario.reference.reference import Reference
+from dikbench.scenario.steps import steps_in
+from dikbench.scenario.variation import NO_VARIATION, Variation
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """A closed-loop case, made once from parameters and a seed.
+
+    Attributes:
+        robot: the robot, with the limits that are in force.
+        q0: start configuration, (nq,).
+        v0: joint velocity at the start, (nv,) [rad/s]: the reference's own, so that a run does not
+            begin with a jump from rest.
+        reference: what the task frame should do.
+        tracking: the task that follows it: pose, position only or orientation only, with its gain.
+        dt: control period [s].
+        duration: length of a time-indexed run [s].
+        certificate: what makes the scenario what it is.
+        tasks: other tasks than the tracking of the reference: below it, or of its priority.
+        motion: the joint motion from which the path was built, on which the certificate was
+            measured, from q0 on; None where no joint motion follows the reference.
+        variation: what a seed perturbs.
+        constraints: what must hold beside the limits of the joints.
+    """
+
+    robot: Robot
+    q0: Array
+    v0: Array
+    reference: Reference
+    tracking: TrackingTask
+    dt: float
+    duration: float
+    certificate: Certificate
+    tasks: tuple[Task, ...] = ()
+    motion: OracleMotion | None = None
+    variation: Variation = NO_VARIATION
+    constraints: tuple[Constraint, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check that a run ends (see `steps_in`)."""
+        steps_in(self.duration, self.dt)
+
+    @cached_property
+    def steps(self) -> int:
+        """Number of control steps of a time-indexed run."""
+        return steps_in(self.duration, self.dt)
+
+    @cached_property
+    def rows(self) -> tuple[int, ...]:
+        """The rows of the twist (linear; angular) of the task frame that are tracked."""
+        return self.tracking.rows(self.robot)
+
+    @cached_property
+    def first(self) -> TrackingTask:
+        """The tracking, together with what is of the same priority."""
+        equal = tuple(task for task in self.tasks if task.priority == self.tracking.priority)
+        return TrackingTogether(self.tracking, equal) if equal else self.tracking
+
+    @cached_property
+    def targets(self) -> list[tuple[Any, Any]]:
+        """Placement and body twist of the reference before each step and after the last.
+
+        Those of a time-indexed run, the same for every law: `pinocchio.SE3`, `pinocchio.Motion`.
+        """
+        return [self.target(k * self.dt) for k in range(self.steps + 1)]
+
+    def target(self, tau: float) -> tuple[Any, Any]:
+        """Placement and body twist of the reference at a nominal time [s]."""
+        return self.reference.placement(tau), pin.Motion(self.reference.velocity(tau))
+
+    @cached_property
+    def target_arrays(self) -> tuple[Array, Array]:
+        """Rotations (n + 1, 3, 3) and translations (n + 1, 3) of `targets`."""
+        rotations = np.array([X.rotation for X, _ in self.targets])
+        return rotations, np.array([X.translation for X, _ in self.targets])
+
+    @cached_property
+    def path(self) -> Path | None:
+        """The path of the reference, as far as any run goes; None for a target at rest."""
+        if not self.reference.moving:
+            return None
+        return path_of(self.reference, max(self.reference.duration, self.steps * self.dt), self.dt)
+
+    @cached_property
+    def oracle(self) -> Array | None:
+        """The joint motion that does the task exactly, at every control step, (n + 1, nq).
+
+        None where there is none.
+
+        Raises:
+            DikbenchError: if it cannot be followed at this control period.
+        """
+        if self.motion is None:
+            return None
+        instants = self.dt * np.arange(self.steps + 1, dtype=float)
+        if self.motion.exact is not None:
+            return np.array([self.motion.exact(tau) for tau in instants])
+        return follow(self.robot, self.reference, self.q0, instants, self.first)

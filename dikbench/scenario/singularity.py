@@ -1,0 +1,195 @@
+"""Singular postures of any arm: found, made exact, and told apart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any, Final, Literal
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.arrays import Array
+from dikbench.errors import DikbenchError
+from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.robot import Robot
+from dikbench.scenario.oracle import position_margin
+
+STEP: Final = 1e-5
+"""Of central differences of the Jacobian [rad]: their error is about its square."""
+
+EXACT: Final = 1e-10
+"""A smallest singular value (m, rad) below this is zero."""
+
+FLAT: Final = 1e-6
+"""A curvature (m/rad^2, rad/rad^2) below this is none."""
+
+Kind = Literal["crossing", "fold", "saddle"]
+
+
+@dataclass(frozen=True, eq=False)
+class Singularity:
+    """A singular posture and what it does to the motion of the task frame.
+
+    With J = U S V^T the body Jacobian (m, rad) at q, n = u_m is the unit twist that no joint
+    velocity makes, Z the joint velocities that move nothing (J Z = 0). Moving along z in Z makes,
+    to second order, the twist n (z^T Q z)/2 with Q_ij = n^T dJ[z_i] z_j.
+
+    - Q = 0, a crossing: nothing in Z helps along n. The arm can move through, by a joint that makes
+      the smallest singular value grow; passing at a distance costs speed as 1/distance.
+    - Q definite or semidefinite, a fold: the edge of what can be reached, n leads to one side only;
+      coming near it costs speed as 1/sqrt(distance).
+    - Q indefinite, a saddle (only on redundant arms): n leads to both sides, each at the price of a
+      fold.
+
+    Attributes:
+        q: the posture, (nq,).
+        placement: of the task frame there (`pinocchio.SE3`).
+        jacobian: J, (m, nv).
+        lost: n, the lost unit twist (linear; angular), (6,), its largest component negative.
+        kind: `crossing`, `fold` or `saddle`.
+        inward: the sign of n towards the side to which `bend` leads.
+        bend: the unit joint velocity in Z along which n is made fastest, (nv,).
+        curvature: |bend^T Q bend|; zero at a crossing.
+        growth: one-sided derivative of the smallest singular value along each joint, (nv,).
+    """
+
+    q: Array
+    placement: Any
+    jacobian: Array
+    lost: Array
+    kind: Kind
+    inward: float
+    bend: Array
+    curvature: float
+    growth: Array
+
+    def oriented_like(self, other: Singularity) -> Singularity:
+        """The same, `lost` and `bend` with the signs that a posture nearby has.
+
+        The signs of singular vectors mean nothing, and may change from one posture to the next.
+        """
+        turned = float(np.sign(self.lost @ other.lost)) or 1.0
+        bent = float(np.sign(self.bend @ other.bend)) or 1.0
+        return replace(
+            self, lost=turned * self.lost, inward=turned * self.inward, bend=bent * self.bend
+        )
+
+
+def analyse(robot: Robot, q: Array) -> Singularity:
+    """What kind of singularity an exactly singular posture (nq,) is.
+
+    Raises:
+        DikbenchError: if the posture is not singular, or loses more than one direction.
+    """
+    kinematics, rows = Kinematics(robot), np.array(robot.task_rows)
+    kinematics.update(q)
+    J = kinematics.jacobian(robot.frame_id)[rows].copy()
+    placement = kinematics.placement(robot.frame_id).copy()
+    U, singular, Vt = np.linalg.svd(J)
+    m = len(rows)
+    if singular[m - 1] > 1e3 * EXACT or singular[m - 2] < 1e-4:
+        raise DikbenchError(
+            f"robot {robot.name}: the posture does not lose exactly one direction, its smallest "
+            f"singular values are {singular[m - 2]:.2g} and {singular[m - 1]:.2g}"
+        )
+    n, Z = U[:, -1], Vt[m - 1 :].T
+    if n[np.argmax(np.abs(n))] > 0:
+        n = -n
+    derivatives = _jacobian_derivatives(robot, q)  # (nv, m, nv)
+    twisting = np.einsum("i,kij->kj", n, derivatives)  # n^T dJ/dq_k, a row per joint
+    along = Z.T @ twisting @ Z
+    Q = (along + along.T) / 2
+    curvatures, directions = np.linalg.eigh(Q)
+    strongest = int(np.argmax(np.abs(curvatures)))
+    kind: Kind = "saddle"
+    if abs(curvatures[strongest]) < FLAT:
+        kind = "crossing"
+    elif curvatures.min() > -FLAT or curvatures.max() < FLAT:
+        kind = "fold"
+    lost = np.zeros(6)
+    lost[rows] = n
+    return Singularity(
+        q=q,
+        placement=placement,
+        jacobian=J,
+        lost=lost,
+        kind=kind,
+        inward=float(np.sign(curvatures[strongest])),
+        bend=Z @ directions[:, strongest],
+        curvature=float(abs(curvatures[strongest])),
+        growth=np.linalg.norm(twisting @ Z, axis=1),
+    )
+
+
+def make_singular(robot: Robot, seed: Array, *, fixed: tuple[int, ...] = ()) -> Array:
+    """The exactly singular posture (nq,) next to a seed (nq,), by Gauss-Newton.
+
+    Solves J(q)^T u = 0, ||u|| = 1 for the posture and its lost twist u together, from u_m of the
+    seed on, in least-norm steps of at most 0.2 rad.
+
+    Args:
+        robot: the robot.
+        seed: where to start.
+        fixed: joints (indices into v) that stay as they are.
+
+    Raises:
+        DikbenchError: if the smallest singular value does not come to zero.
+    """
+    rows, nv = np.array(robot.task_rows), robot.nv
+    m = len(rows)
+    kinematics = Kinematics(robot)
+    free = np.setdiff1d(np.arange(nv), fixed)
+    q = seed
+    sigma = np.inf
+    for _ in range(50):
+        kinematics.update(q)
+        J = kinematics.jacobian(robot.frame_id)[rows]
+        U, singular, _ = np.linalg.svd(J)
+        u, sigma = U[:, -1], float(singular[m - 1])
+        if sigma < EXACT:
+            return q
+        A = np.zeros((nv + 1, len(free) + m))
+        A[:nv, : len(free)] = np.einsum("i,kij->jk", u, _jacobian_derivatives(robot, q)[free])
+        A[:nv, len(free) :] = J.T
+        A[nv, len(free) :] = u
+        step = np.zeros(nv)
+        step[free] = np.linalg.lstsq(A, np.append(-J.T @ u, 0.0), rcond=1e-9)[0][: len(free)]
+        step *= min(1.0, 0.2 / max(float(np.abs(step).max()), 1e-300))
+        q = pin.integrate(robot.model, q, step)
+    raise DikbenchError(
+        f"robot {robot.name}: no singular posture found, the smallest singular value is {sigma:.2g}"
+    )
+
+
+def singular_postures(robot: Robot, margin: float, attempts: int = 24) -> Iterator[Array]:
+    """Singular postures (nq,) inside the position limits, from the robot's start outwards.
+
+    Args:
+        robot: the robot.
+        margin: least distance to each position limit [rad].
+        attempts: number of seeds: the start, then ever farther from it, always the same ones.
+    """
+    random = np.random.default_rng(0)
+    for attempt in range(attempts):
+        spread = 1.5 * attempt / attempts
+        seed = pin.integrate(robot.model, robot.q0, random.uniform(-spread, spread, robot.nv))
+        try:
+            q = make_singular(robot, seed)
+        except DikbenchError:
+            continue
+        if position_margin(robot, q) >= margin:
+            yield q
+
+
+def _jacobian_derivatives(robot: Robot, q: Array) -> Array:
+    """dJ/dq_k of the rows that the arm can move, by central differences, (nv, m, nv)."""
+    rows, nv = np.array(robot.task_rows), robot.nv
+    kinematics, unit = Kinematics(robot), np.eye(nv)
+    derivatives = np.empty((nv, len(rows), nv))
+    for k in range(nv):
+        kinematics.update(pin.integrate(robot.model, q, STEP * unit[k]))
+        ahead = kinematics.jacobian(robot.frame_id)[rows].copy()
+        kinematics.update(pin.integrate(robot.model, q, -STEP * unit[k]))
+        derivatives[k] = (ahead - kinematics.jacobian(robot.frame_id)[rows]) / (2 * STEP)
+    return derivatives

@@ -1,0 +1,97 @@
+"""What a seed may change of a scenario, and within which ranges; seed 0 changes nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.arrays import Array
+from dikbench.errors import DikbenchError
+from dikbench.robots.robot import Robot
+
+
+@dataclass(frozen=True)
+class Variation:
+    """The ranges, declared by a family, within which a seed perturbs its scenarios.
+
+    Attributes:
+        start: each joint of the posture from which the motion is built is moved by at most this
+            [rad or m].
+        direction: the direction of the motion is turned by at most this [rad].
+        timing: the motion's duration is changed by at most this share.
+    """
+
+    start: float = 0.0
+    direction: float = 0.0
+    timing: float = 0.0
+
+    def drawn(self, seed: int) -> Perturbation:
+        """What this seed changes.
+
+        Raises:
+            DikbenchError: on a negative seed.
+        """
+        if seed < 0:
+            raise DikbenchError(f"seed {seed} must not be negative")
+        return Perturbation(self, seed)
+
+    def __str__(self) -> str:
+        """The ranges in words."""
+        parts = [
+            f"start by up to {self.start:.3g} rad per joint" if self.start else "",
+            f"direction by up to {self.direction:.3g} rad" if self.direction else "",
+            f"timing by up to {100 * self.timing:.3g} %" if self.timing else "",
+        ]
+        return ", ".join(part for part in parts if part) or "nothing"
+
+
+NO_VARIATION: Final = Variation()
+"""Of a family in which a seed changes nothing."""
+
+
+@dataclass(frozen=True)
+class Perturbation:
+    """What one seed changes; uniform within the declared ranges, each part drawn by itself.
+
+    Attributes:
+        ranges: the ranges.
+        seed: 0 changes nothing.
+    """
+
+    ranges: Variation
+    seed: int
+
+    def posture(self, robot: Robot, q: Array, fixed: tuple[int, ...] = ()) -> Array:
+        """A configuration (nq,) with its joints moved, but those (indices into v) in `fixed`."""
+        if self.seed == 0 or self.ranges.start == 0:
+            return q
+        step = self._random(0).uniform(-self.ranges.start, self.ranges.start, robot.nv)
+        step[list(fixed)] = 0.0
+        moved: Array = pin.integrate(robot.model, q, step)
+        return moved
+
+    def rotation(self, robot: Robot) -> Array:
+        """A rotation (3, 3) by which directions are turned; a planar arm keeps to its plane."""
+        if self.seed == 0 or self.ranges.direction == 0:
+            return np.eye(3)
+        random = self._random(1)
+        axis = random.normal(size=3)
+        angle = random.uniform(-self.ranges.direction, self.ranges.direction)
+        if 2 not in robot.task_rows:
+            axis = np.array([0.0, 0.0, 1.0])
+        turned: Array = pin.exp3(angle * axis / float(np.linalg.norm(axis)))
+        return turned
+
+    @cached_property
+    def pace(self) -> float:
+        """The factor by which the motion's duration is longer."""
+        if self.seed == 0 or self.ranges.timing == 0:
+            return 1.0
+        return 1.0 + float(self._random(2).uniform(-self.ranges.timing, self.ranges.timing))
+
+    def _random(self, part: int) -> np.random.Generator:
+        return np.random.default_rng([self.seed, part])

@@ -1,0 +1,1 @@
+"""The closed loop, one control step of it, and what is recorded."""

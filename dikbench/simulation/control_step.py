@@ -1,0 +1,120 @@
+"""One control step: ask the law, and stand by a fallback where it has no answer."""
+
+from __future__ import annotations
+
+from time import perf_counter_ns
+
+import msgspec
+import numpy as np
+
+from dikbench.arrays import Array
+from dikbench.errors import CannotAnswer, Infeasible
+from dikbench.problem.problem import DikProblem, Formulation
+from dikbench.problem.velocity_box import velocity_box
+from dikbench.simulation.status import Status
+from dikbench.solvers.checked_solve import CheckedSolve
+
+FLOATS = np.dtype(float)
+OK = Status.OK  # an attribute of an enumeration costs as much as a small product
+
+
+class TrialEnded(Exception):
+    """A law did what ends a trial; carries the status and the message."""
+
+    def __init__(self, status: Status, message: str) -> None:
+        super().__init__(message)
+        self.status = status
+
+
+class Outcome(msgspec.Struct, eq=False):
+    """What came of one control step.
+
+    Attributes:
+        velocity: the law's velocity or the fallback's, (nv,) [rad/s].
+        status: `ok`, `infeasible` or `solver-failed` (whether an answer is verified is known after
+            the recheck, `stuck` is judged by the motion).
+        law_ns: time in the law, its solver included, rechecking excluded [ns].
+        square: v^T v.
+    """
+
+    velocity: Array
+    status: Status
+    law_ns: int
+    square: float
+
+
+def control_step(
+    formulation: Formulation, problem: DikProblem, solve: CheckedSolve, step: int = 0
+) -> Outcome:
+    """Ask the law for the velocity of this step (its number in the run).
+
+    Raises:
+        TrialEnded: if the law raises anything but `CannotAnswer`, or returns what is not a finite
+            vector (nv,) of real numbers.
+    """
+    solve.begin_step(step)
+    start = perf_counter_ns()
+    try:
+        v = formulation.velocity(problem, solve)
+    except CannotAnswer as error:
+        law_ns = perf_counter_ns() - start - solve.checking_ns
+        status = Status.INFEASIBLE if isinstance(error, Infeasible) else Status.SOLVER_FAILED
+        v = fallback(problem)
+        return Outcome(v, status, law_ns, float(v.dot(v)))
+    except MemoryError as error:
+        raise TrialEnded(Status.OUT_OF_MEMORY, f"{type(error).__name__}: {error}") from error
+    except Exception as error:
+        message = str(error).strip().partition("\n")[0]
+        raise TrialEnded(Status.FORMULATION_ERROR, f"{type(error).__name__}: {message}") from error
+    law_ns = perf_counter_ns() - start - solve.checking_ns
+    return Outcome(v, OK, law_ns, _square(v, problem.robot.nv))
+
+
+def _square(v: object, nv: int) -> float:
+    """v^T v of what a law returned, which is checked first."""
+    if type(v) is not np.ndarray or v.shape != (nv,) or v.dtype is not FLOATS:
+        _check_velocity(v, nv)
+    square: float = v.dot(v)  # type: ignore[attr-defined]
+    # One product tells almost always, and costs a third of asking every entry.
+    if not square < np.inf and not np.isfinite(v).all():  # type: ignore[call-overload]
+        raise TrialEnded(Status.NOT_FINITE, f"velocity {v.tolist()}")  # type: ignore[attr-defined]
+    return square
+
+
+def _check_velocity(v: object, nv: int) -> None:
+    if not isinstance(v, np.ndarray) or v.shape != (nv,):
+        shape = getattr(v, "shape", type(v).__name__)
+        raise TrialEnded(Status.WRONG_SHAPE, f"expected ({nv},), got {shape}")
+    if v.dtype.kind not in "fiu":
+        raise TrialEnded(Status.WRONG_SHAPE, f"expected real numbers, got {v.dtype}")
+
+
+def fallback(problem: DikProblem) -> Array:
+    """Slow down uniformly: v = c v_prev, clipped to the velocity box.
+
+    c is the smallest factor in [0, 1] that neither a joint's acceleration limit forbids,
+    1 - min_i a_i dt / |v_prev,i|, nor a row of G v <= h (a torque that is not there cannot brake);
+    without either, or without v_prev, the robot stops at once (outside a position limit the box
+    then asks for the way back).
+    """
+    box = velocity_box(problem.limits, problem.v_prev, problem.dt)  # not recorded as the law's
+    v = np.zeros(problem.robot.nv)
+    if problem.v_prev is not None:
+        v = _slowest(problem, problem.v_prev) * problem.v_prev
+    return np.clip(v, box.lower, box.upper)
+
+
+def _slowest(problem: DikProblem, v_prev: Array) -> float:
+    """The smallest factor c (see `fallback`)."""
+    factors = [0.0]
+    acceleration = problem.limits.joint.acceleration
+    if acceleration is not None:
+        slow = np.where(v_prev > 0, -acceleration.lower, acceleration.upper) * problem.dt
+        speed = np.abs(v_prev)
+        fast = speed > slow  # the others can stop in one step
+        factors.extend(1.0 - slow[fast] / speed[fast])
+    if problem.G is not None and problem.h is not None:
+        change = problem.G @ v_prev
+        asking = (change < 0) & (problem.h < 0)  # rows that stopping would break
+        factors.extend(problem.h[asking] / change[asking])
+    return min(1.0, float(max(factors)))

@@ -1,0 +1,181 @@
+"""One control step for a person at a prompt."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from numbers import Real
+from typing import Any, Final, Literal, get_args
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.arrays import Array
+from dikbench.errors import DikbenchError, unknown
+from dikbench.plugins.registry import make_formulation
+from dikbench.problem.constraints import Constraint, linearize_all
+from dikbench.problem.problem import DikProblem, Formulation, program_of
+from dikbench.problem.progress import STUCK_PROGRESS, progress, row_weights
+from dikbench.problem.tasks import LinearizedTask, PoseTask, Task
+from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.robot import Robot, checked_vector
+from dikbench.simulation.control_step import TrialEnded, control_step
+from dikbench.simulation.status import Status
+from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, parse_solver, why_not
+from dikbench.solvers.checked_solve import CheckedSolve, make_solve
+
+ReferenceFrame = Literal["LOCAL", "LOCAL_WORLD_ALIGNED", "WORLD"]
+REFERENCE_FRAMES: Final = get_args(ReferenceFrame)
+
+
+@dataclass(frozen=True, eq=False)
+class DikAnswer:
+    """The answer to one control step.
+
+    Attributes:
+        velocity: joint velocity, (nv,) [rad/s or m/s]; the fallback's where the law had none.
+        progress: share of the wanted motion that it makes, <J v, V>/|V|^2 with angular rows
+            weighted by L = 0.2 m (the alpha of laws that scale); NaN where nothing is wanted.
+        status: how the step ended.
+        relaxed: number of joints whose acceleration bound had to be given up.
+    """
+
+    velocity: Array
+    progress: float
+    status: Status
+    relaxed: int
+
+
+def solve_dik(
+    robot: Robot,
+    q: object,
+    *,
+    formulation: str | Formulation,
+    twist: object = None,
+    target: Any = None,
+    reference_frame: ReferenceFrame = "LOCAL",
+    gain: float | None = None,
+    dt: float = 0.01,
+    solver: str | None = None,
+    v_prev: object = None,
+    tasks: Sequence[Task] = (),
+    constraints: Sequence[Constraint] = (),
+) -> DikAnswer:
+    """Compute the joint velocity of one control step.
+
+    Where q is outside a position limit, laws that keep the limits ask for the way back, at most at
+    a tenth of the velocity limit, or answer by the fallback that does (status `infeasible`).
+
+    Args:
+        robot: the robot, with the limits that are in force.
+        q: configuration, (nq,).
+        formulation: a law or its selector, such as `dls[damping=0.1]`.
+        twist: wanted twist of the task frame, (linear; angular), (6,) [m/s; rad/s].
+        target: wanted placement of the task frame (`pinocchio.SE3`); give this or a twist.
+        reference_frame: the axes in which the twist is given, Pinocchio's names.
+        gain: of the target, 1/s; default 1/dt (there in one step).
+        dt: control period [s].
+        solver: a solver's selector, such as `osqp[eps_abs=1e-6]`; default: daqp, or clarabel for a
+            law written in cvxpy. Not used by laws that need none.
+        v_prev: velocity applied in the step before, (nv,); None means no acceleration bound.
+        tasks: secondary tasks.
+        constraints: what must hold beside the limits of the joints.
+
+    Raises:
+        DikbenchError: on a wrong name, shape or value, or a law that raises, or answers with a
+            wrong shape or NaN.
+    """
+    if not isinstance(robot, Robot):
+        raise DikbenchError(
+            f"robot: expected a Robot (dikbench.load_robot), got {type(robot).__name__}"
+        )
+    law = make_formulation(formulation) if isinstance(formulation, str) else formulation
+    if not isinstance(law, Formulation):
+        raise DikbenchError(f"formulation: expected a law or its selector, got {law!r}")
+    _check_positive("dt", dt)
+    if reference_frame not in REFERENCE_FRAMES:
+        raise unknown("reference_frame", reference_frame, REFERENCE_FRAMES)
+    configuration = robot.configuration(q)
+    previous = None if v_prev is None else checked_vector(v_prev, robot.nv, "v_prev")
+    _check_tasks(tasks)
+    if solver is not None and not isinstance(solver, str):
+        raise DikbenchError(f"solver: expected a selector such as 'daqp', got {solver!r}")
+    kinematics = Kinematics(robot)
+    kinematics.update(configuration)
+    if (twist is None) == (target is None):
+        raise DikbenchError("give either a twist or a target")
+    if target is None:
+        if gain is not None:
+            raise DikbenchError("gain: belongs to a target; a twist has none")
+        main = _twist_task(kinematics, twist, reference_frame)
+    else:
+        main = _target_task(kinematics, target, 1 / dt if gain is None else gain)
+    problem = DikProblem(
+        robot,
+        configuration,
+        previous,
+        dt,
+        sorted([main, *(task.linearize(kinematics) for task in tasks)], key=lambda t: t.priority),
+        robot.limits.at(configuration),
+    )
+    problem.G, problem.h = linearize_all(constraints, kinematics, previous, dt)
+    solve = _solve_for(law, solver)
+    try:
+        outcome = control_step(law, problem, solve)
+    except TrialEnded as ended:
+        raise DikbenchError(f"{ended.status.value}: {ended}") from ended
+    v = outcome.velocity
+    alpha = float(progress(main.V[None], (main.J @ v)[None], row_weights(robot.task_rows))[0])
+    status, verdicts = outcome.status, solve.verdicts()
+    if status is Status.OK and verdicts.lied[0]:
+        status = Status.NOT_VERIFIED
+    if status is Status.OK and alpha < STUCK_PROGRESS:
+        status = Status.STUCK
+    return DikAnswer(v, alpha, status, problem.relaxed)
+
+
+def _solve_for(law: Formulation, selector: str | None) -> CheckedSolve:
+    program = program_of(law)
+    if program is None:
+        if selector is not None:
+            parse_solver(selector)  # a wrong name is an error even where it is not needed
+        return make_solve(None, None)
+    solver = parse_solver(DEFAULT_SOLVER[program] if selector is None else selector)
+    reason = why_not(solver, program)
+    if reason:
+        raise DikbenchError(reason)
+    return make_solve(solver, program)
+
+
+def _check_positive(name: str, value: object) -> None:
+    if not isinstance(value, Real) or not 0 < float(value) < float("inf"):
+        raise DikbenchError(f"{name}: expected a positive finite number, got {value!r}")
+
+
+def _check_tasks(tasks: object) -> None:
+    if not isinstance(tasks, Sequence) or not all(hasattr(task, "linearize") for task in tasks):
+        raise DikbenchError(
+            "tasks: expected a list of tasks, such as [dikbench.PostureTask(target=robot.q0)]"
+        )
+
+
+def _twist_task(kinematics: Kinematics, twist: object, reference_frame: str) -> LinearizedTask:
+    """The task J v = V for a twist that is given in the axes of a reference frame."""
+    robot = kinematics.robot
+    V = checked_vector(twist, 6, "twist")
+    X = kinematics.placement(robot.frame_id)
+    if reference_frame == "LOCAL_WORLD_ALIGNED":
+        V = np.concatenate([X.rotation.T @ V[:3], X.rotation.T @ V[3:]])
+    elif reference_frame == "WORLD":
+        V = X.toActionMatrixInverse() @ V
+    rows = np.array(robot.task_rows)
+    return LinearizedTask(kinematics.jacobian(robot.frame_id)[rows], V[rows], np.zeros(len(rows)))
+
+
+def _target_task(kinematics: Kinematics, target: Any, gain: float) -> LinearizedTask:
+    if not isinstance(target, pin.SE3):
+        raise DikbenchError(f"target: expected a pinocchio.SE3, got {type(target).__name__}")
+    if not np.isfinite(target.homogeneous).all():
+        raise DikbenchError("target: expected finite numbers")
+    _check_positive("gain", gain)
+    return PoseTask(target=target, gain=gain).linearize(kinematics)

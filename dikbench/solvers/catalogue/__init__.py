@@ -1,0 +1,1 @@
+"""The solvers that there are, and their settings."""

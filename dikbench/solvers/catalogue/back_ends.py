@@ -1,0 +1,220 @@
+"""The solvers that are known by name: what each can solve, and which settings it takes."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, Final, Literal, get_args
+
+import msgspec
+
+from dikbench.errors import DikbenchError, unknown
+from dikbench.programs.quadratic_program import Program
+from dikbench.selector import Selector, parse_selector
+from dikbench.solvers.catalogue.presets import TOLERANCES, Preset, preset_settings
+
+Interface = Literal["cold", "warm", "cvxpy"]
+INTERFACES: Final = get_args(Interface)
+PRESETS: Final = get_args(Preset)
+
+
+@dataclass(frozen=True)
+class BackEnd:
+    """A solver library.
+
+    Attributes:
+        summary: one line for `dikbench list solvers`.
+        package: the import name of the library.
+        distribution: its name on the package index, whose version stands in the manifest.
+        programs: what it can solve when called with matrices.
+        interfaces: how it can be called, the default first.
+        settings: the settings that it takes, with their types.
+        no_lp: why it cannot solve linear programs, where it cannot.
+        ours: settings that are ours where the user names none, and not the library's.
+    """
+
+    summary: str
+    package: str
+    distribution: str
+    programs: frozenset[Program]
+    interfaces: tuple[Interface, ...]
+    settings: Mapping[str, type]
+    no_lp: str = ""
+    ours: Mapping[str, Any] = field(default_factory=dict)
+
+
+_QP_ONLY: Final[frozenset[Program]] = frozenset({"qp"})
+_QP_AND_LP: Final[frozenset[Program]] = frozenset({"qp", "lp"})
+
+BACK_ENDS: Mapping[str, BackEnd] = MappingProxyType(
+    {
+        "osqp": BackEnd(
+            "operator splitting; Stellato et al. 2020",
+            "osqp",
+            "osqp",
+            _QP_AND_LP,
+            ("cold", "warm", "cvxpy"),
+            {"eps_abs": float, "eps_rel": float, "max_iter": int, "polishing": bool},
+        ),
+        "clarabel": BackEnd(
+            "interior point, homogeneous embedding; Goulart & Chen 2024",
+            "clarabel",
+            "clarabel",
+            _QP_AND_LP,
+            ("cold", "warm", "cvxpy"),
+            {"tol_feas": float, "tol_gap_abs": float, "tol_gap_rel": float, "max_iter": int},
+        ),
+        "piqp": BackEnd(
+            "proximal interior point; Schwan et al. 2023",
+            "piqp",
+            "piqp",
+            _QP_AND_LP,
+            ("cold", "warm"),
+            {"eps_abs": float, "eps_rel": float, "max_iter": int},
+        ),
+        "proxqp": BackEnd(
+            "proximal augmented Lagrangian; Bambade et al. 2022",
+            "proxsuite",
+            "proxsuite",
+            _QP_ONLY,
+            ("cold", "warm"),
+            {"eps_abs": float, "eps_rel": float, "max_iter": int},
+            no_lp="through qpsolvers it fails on linear programs",
+        ),
+        "daqp": BackEnd(
+            "dual active set; Arnstrom, Bemporad & Axehill 2022",
+            "daqp",
+            "daqp",
+            _QP_AND_LP,
+            ("cold", "warm"),
+            {"primal_tol": float, "dual_tol": float, "iter_limit": int},
+        ),
+        "highs": BackEnd(
+            "simplex for linear, active set for quadratic programs; Huangfu & Hall 2018",
+            "highspy",
+            "highspy",
+            _QP_AND_LP,
+            ("cold", "warm", "cvxpy"),
+            {
+                "primal_feasibility_tolerance": float,
+                "dual_feasibility_tolerance": float,
+                "qp_iteration_limit": int,
+            },
+            # Its active-set method cycles without end on some semidefinite programs of our size.
+            ours=MappingProxyType({"qp_iteration_limit": 1000}),
+        ),
+        "quadprog": BackEnd(
+            "dual active set (GPL, an optional extra); Goldfarb & Idnani 1983",
+            "quadprog",
+            "quadprog",
+            _QP_ONLY,
+            ("cold",),
+            {},
+            no_lp="it needs a positive definite cost",
+        ),
+        "scs": BackEnd(
+            "operator splitting for cones; O'Donoghue et al. 2016",
+            "scs",
+            "scs",
+            _QP_AND_LP,
+            ("cvxpy",),
+            {"eps_abs": float, "eps_rel": float, "max_iters": int},
+        ),
+    }
+)
+
+DEFAULT_SOLVER: Final[Mapping[Program, str]] = MappingProxyType(
+    {"qp": "daqp", "lp": "daqp", "cvxpy": "clarabel"}
+)
+"""The solver that a law gets where none is named."""
+
+
+@dataclass(frozen=True)
+class Solver:
+    """A back end, how it is called, and its settings (those not named are the library's).
+
+    `tolerance` is the largest residual of a verified answer, as its preset says.
+    """
+
+    name: str
+    interface: Interface
+    settings: Mapping[str, Any]
+    tolerance: float = TOLERANCES["default"]
+
+
+def is_installed(name: str) -> bool:
+    """Whether the back end of this name can be imported here."""
+    return importlib.util.find_spec(BACK_ENDS[name].package) is not None
+
+
+def parse_solver(text: str) -> Solver:
+    """Read a selector such as `osqp`, `osqp[preset=high]` or `clarabel[interface=warm]`.
+
+    A setting that is named beside a preset goes before the preset's.
+
+    Raises:
+        DikbenchError: on an unknown solver, interface, preset or setting, a value of the wrong
+            type, or a solver that is not installed.
+    """
+    selector = parse_selector(text)
+    if selector.name not in BACK_ENDS:
+        raise unknown("solver", selector.name, BACK_ENDS)
+    back_end = BACK_ENDS[selector.name]
+    if not is_installed(selector.name):
+        raise DikbenchError(
+            f"solver {selector.name!r} is not installed: pip install {back_end.distribution}"
+        )
+    parameters = dict(selector.parameters)
+    interface = parameters.pop("interface", back_end.interfaces[0])
+    if interface not in back_end.interfaces:
+        raise unknown(f"interface of solver {selector.name}", interface, back_end.interfaces)
+    preset: Any = parameters.pop("preset", "default")
+    if preset not in PRESETS:
+        raise unknown(f"preset of solver {selector.name}", preset, PRESETS)
+    settings = {
+        **back_end.ours,
+        **preset_settings(selector.name, preset),
+        **_settings(back_end, selector, parameters),
+    }
+    return Solver(selector.name, interface, MappingProxyType(settings), TOLERANCES[preset])
+
+
+def why_not(solver: Solver, program: Program) -> str:
+    """Why this solver cannot take this kind of program; empty where it can."""
+    back_end = BACK_ENDS[solver.name]
+    if program == "cvxpy":
+        if solver.interface == "warm":
+            return f"{solver.name}[interface=warm] takes matrices, and the law is written in cvxpy"
+        if "cvxpy" in back_end.interfaces:
+            return ""
+        valid = ", ".join(n for n, b in BACK_ENDS.items() if "cvxpy" in b.interfaces)
+        return f"{solver.name} is not called through cvxpy here; valid: {valid}"
+    if program == "lp" and program not in back_end.programs:
+        return f"{solver.name} cannot take a linear program: {back_end.no_lp}"
+    return ""
+
+
+def _settings(
+    back_end: BackEnd, selector: Selector, parameters: Mapping[str, str]
+) -> Mapping[str, Any]:
+    settings = {}
+    for key, text in parameters.items():
+        if key not in back_end.settings:
+            valid = ("interface", "preset", *back_end.settings)
+            raise unknown(f"setting of solver {selector.name}", key, valid)
+        kind = back_end.settings[key]
+        try:
+            value: float = msgspec.convert(text, kind, strict=False)
+        except msgspec.ValidationError:
+            raise DikbenchError(
+                f"solver {selector.name}: {key} must be of type {kind.__name__}, got {text!r}"
+            ) from None
+        least = 1 if kind is int else 0  # a tolerance may be switched off by 0
+        if kind is not bool and not least <= value < float("inf"):
+            raise DikbenchError(
+                f"solver {selector.name}: {key} must be finite and at least {least}, got {text!r}"
+            )
+        settings[key] = value
+    return settings

@@ -1,0 +1,1 @@
+"""Checks of a solver's answer: residuals, feasibility, distance from the optimum."""

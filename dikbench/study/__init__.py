@@ -1,0 +1,1 @@
+"""Which cells to run: studies, trials, their identity."""

@@ -1,0 +1,45 @@
+"""The train split and the test split: what tuning may look at, and what it must not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Final
+
+from dikbench.errors import DikbenchError
+from dikbench.study.identity import scenario_id
+
+SPLITS: Final[Mapping[str, range]] = MappingProxyType(
+    {"train": range(1, 100), "test": range(100, 1000)}
+)
+"""The seeds of each split. Seed 0, the unperturbed case that everybody looks at, is in neither."""
+
+
+def check_split(
+    name: str, split: str, scenarios: Sequence[str], seeds: Sequence[int], others: Sequence[str]
+) -> None:
+    """Check that a study keeps to its split.
+
+    Args:
+        name: the study's.
+        split: `train` or `test`.
+        scenarios: selectors of its scenarios.
+        seeds: its seeds.
+        others: selectors of the scenarios of the other split.
+
+    Raises:
+        DikbenchError: if a seed or a scenario belongs to the other split, or to none.
+    """
+    allowed = SPLITS[split]
+    for seed in seeds:
+        if seed not in allowed:
+            raise DikbenchError(
+                f"study {name}: seed {seed} is not in the {split} split; "
+                f"valid: {allowed.start} to {allowed.stop - 1}"
+            )
+    reserved = {scenario_id(text) for text in others}
+    for text in scenarios:
+        if scenario_id(text) in reserved:
+            raise DikbenchError(
+                f"study {name}: scenario {text!r} belongs to the other split than {split}"
+            )

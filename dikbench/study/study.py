@@ -1,0 +1,278 @@
+"""Studies: which cells to run. One TOML file; it only selects and sets parameters."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+
+from dikbench.errors import DikbenchError, unknown
+from dikbench.plugins.registry import (
+    make_formulation,
+    make_plant,
+    make_scenario,
+    scenario_parameters,
+)
+from dikbench.problem.problem import program_of
+from dikbench.programs.quadratic_program import Program
+from dikbench.scenario.oracle import ORACLE
+from dikbench.scenario.plant import REFERENCE_MODES
+from dikbench.selector import alternatives, parse_selector
+from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, parse_solver, why_not
+from dikbench.study.identity import trial_id
+from dikbench.study.split import SPLITS, check_split
+from dikbench.study.trial import NO_SOLVER, Trial
+
+DEFAULT_STUDY = "quick"
+
+BUILT_AHEAD = 40
+"""So many scenarios of a study are built before anything runs; of the others, in studies with
+hundreds, the parameters are checked and a certificate that fails is a skipped row."""
+
+NOT_EMPTY = msgspec.Meta(min_length=1)
+Names = Annotated[tuple[str, ...], NOT_EMPTY]
+
+
+class Cells(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """Formulations and the solvers with which each is run (none for laws that need none)."""
+
+    formulations: Names
+    solvers: tuple[str, ...] = ()
+
+
+class TimingSettings(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """The timing pass.
+
+    Attributes:
+        reference: the law whose run supplies the problems of each scenario.
+        problems: how many of them, contiguous, from the middle of the run.
+        rounds: how often they are replayed.
+        scenarios: which of the study's scenarios are timed; empty: all.
+    """
+
+    reference: str
+    problems: Annotated[int, msgspec.Meta(ge=1)] = 100
+    rounds: Annotated[int, msgspec.Meta(ge=1)] = 5
+    scenarios: tuple[str, ...] = ()
+
+
+class Study(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """A selection of cells.
+
+    Attributes:
+        description: one line.
+        cells: formulations with their solvers.
+        scenarios: selectors of scenarios.
+        plants, references, seeds: see `Trial`.
+        split: "train" or "test" holds the study to the seeds and scenarios of that split (see
+            `dikbench.study.split`); empty: any.
+        example: the scenario whose runs are drawn against time; default: the first one.
+        timing: the timing pass; None: no times are taken.
+        name: the study's name (from the file's).
+    """
+
+    description: str
+    cells: Annotated[tuple[Cells, ...], NOT_EMPTY]
+    scenarios: Names
+    plants: Names = ("ideal", "saturating")
+    references: Annotated[tuple[Literal["time", "path"], ...], NOT_EMPTY] = ("time",)
+    seeds: Annotated[tuple[Annotated[int, msgspec.Meta(ge=0)], ...], NOT_EMPTY] = (0,)
+    split: Literal["", "train", "test"] = ""
+    example: str = ""
+    timing: TimingSettings | None = None
+    name: str = ""
+
+
+class PlannedTrial(msgspec.Struct, frozen=True):
+    """A trial, its id, and why it cannot run, if it cannot."""
+
+    id: str
+    trial: Trial
+    skip: str = ""
+
+
+def shipped_studies() -> dict[str, Path]:
+    """The studies that come with dikbench, by name."""
+    folder = Path(str(resources.files("dikbench.study") / "studies"))
+    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def load_study(name_or_file: str) -> Study:
+    """Read a shipped study or a TOML file.
+
+    Raises:
+        DikbenchError: if there is no such study or file, or it is not a study.
+    """
+    shipped = shipped_studies()
+    if name_or_file in shipped:
+        path = shipped[name_or_file]
+    elif name_or_file.endswith(".toml") or Path(name_or_file).is_file():
+        path = Path(name_or_file)
+    else:
+        raise unknown("study", name_or_file, shipped, "(or give the path of a .toml file)")
+    try:
+        study = msgspec.toml.decode(path.read_bytes(), type=Study)
+    except OSError as error:
+        raise DikbenchError(f"study {path}: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise DikbenchError(f"study {path}: not a text file in UTF-8") from None
+    except msgspec.ValidationError as error:
+        raise DikbenchError(f"study {path}: {_explained(str(error))}") from None
+    except msgspec.DecodeError as error:
+        raise DikbenchError(f"study {path}: not valid TOML: {error}") from None
+    return _spread(msgspec.structs.replace(study, name=study.name or path.stem))
+
+
+def _spread(study: Study) -> Study:
+    """The study with one value per parameter in each of its selectors (see `alternatives`)."""
+    cells = tuple(Cells(_each(c.formulations), _each(c.solvers)) for c in study.cells)
+    timing = study.timing
+    if timing is not None:
+        timing = msgspec.structs.replace(timing, scenarios=_each(timing.scenarios))
+    return msgspec.structs.replace(
+        study,
+        cells=cells,
+        scenarios=_each(study.scenarios),
+        plants=_each(study.plants),
+        timing=timing,
+    )
+
+
+def _each(selectors: Sequence[str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(text for given in selectors for text in alternatives(given)))
+
+
+def _explained(reason: str) -> str:
+    """An error of msgspec, with the valid keys where the key was wrong."""
+    if "Invalid enum value" in reason:
+        return f"{reason}; valid: {', '.join(SPLITS if 'split' in reason else REFERENCE_MODES)}"
+    if "unknown field" not in reason:
+        return reason
+    place = Cells if "$.cells" in reason else TimingSettings if "$.timing" in reason else Study
+    valid = ", ".join(field.name for field in msgspec.structs.fields(place))
+    return f"{reason}; valid keys: {valid}"
+
+
+class Selection(msgspec.Struct, frozen=True):
+    """What replaces axes of a study; an empty axis stays the study's own."""
+
+    formulations: tuple[str, ...] = ()
+    scenarios: tuple[str, ...] = ()
+    solvers: tuple[str, ...] = ()
+    seeds: tuple[int, ...] = ()
+    plants: tuple[str, ...] = ()
+    references: tuple[str, ...] = ()
+
+
+def select(base: Study, selection: Selection, *, named: bool) -> Study:
+    """A study with some of its axes replaced.
+
+    A formulation that is given without a solver keeps the solvers that a named study has for it;
+    otherwise it runs with the default solver.
+
+    Args:
+        base: the study to start from.
+        selection: what replaces its axes.
+        named: whether the user named the study.
+    """
+    if selection == Selection():
+        return base
+    selection = msgspec.structs.replace(
+        selection,
+        **{
+            axis: _each(getattr(selection, axis))
+            for axis in ("formulations", "scenarios", "solvers", "plants")
+        },
+    )
+    cells = base.cells
+    if selection.formulations:
+        cells = tuple(_cells_for(base, text, named) for text in selection.formulations)
+    if selection.solvers:
+        cells = tuple(msgspec.structs.replace(c, solvers=selection.solvers) for c in cells)
+    changes: dict[str, Any] = {
+        axis: getattr(selection, axis)
+        for axis in ("scenarios", "seeds", "plants", "references")
+        if getattr(selection, axis)
+    }
+    if base.example not in (selection.scenarios or base.scenarios):
+        changes["example"] = ""
+    if base.timing is not None and selection.scenarios:
+        changes["timing"] = msgspec.structs.replace(base.timing, scenarios=())
+    if not named:
+        changes |= {"name": "selection", "description": "Selected on the command line"}
+    return msgspec.structs.replace(base, cells=cells, **changes)
+
+
+def _cells_for(base: Study, text: str, named: bool) -> Cells:
+    program = _program(text)
+    if program is None:
+        return Cells((text,))
+    if named:
+        for cell in base.cells:
+            if parse_selector(text).name in {parse_selector(f).name for f in cell.formulations}:
+                return Cells((text,), cell.solvers)
+    return Cells((text,), (DEFAULT_SOLVER[program],))
+
+
+def expand(study: Study) -> list[PlannedTrial]:
+    """Every trial of a study, in a fixed order, each once.
+
+    Names, parameters and solvers are checked, and the first scenarios are built, so that a mistake
+    shows before anything runs. A pair of law and solver that cannot work is kept,
+    with the reason.
+
+    Raises:
+        DikbenchError: on the first selector that does not name anything valid.
+    """
+    for number, scenario in enumerate(study.scenarios):
+        if number < BUILT_AHEAD:
+            make_scenario(scenario, study.seeds[0])
+        else:
+            scenario_parameters(scenario)
+    for plant in study.plants:
+        make_plant(plant)
+    if study.split:
+        other = "test" if study.split == "train" else "train"
+        others = load_study(other).scenarios
+        check_split(study.name, study.split, study.scenarios, study.seeds, others)
+    if study.timing is not None and program_of(make_formulation(study.timing.reference)):
+        raise DikbenchError(
+            f"study {study.name}: timing.reference {study.timing.reference!r} needs a solver; "
+            "name a law that needs none"
+        )
+    planned: dict[str, PlannedTrial] = {}
+    for cells in study.cells:
+        for formulation in cells.formulations:
+            for solver, skip in _solvers_for(study, formulation, cells.solvers):
+                plants, references = study.plants, study.references
+                if formulation == ORACLE:  # nothing is fed back: there is one way to run it
+                    plants, references = ("ideal",), ("time",)
+                for scenario, plant, reference, seed in itertools.product(
+                    study.scenarios, plants, references, study.seeds
+                ):
+                    trial = Trial(formulation, scenario, solver, plant, reference, seed)
+                    name = trial_id(trial)
+                    planned.setdefault(name, PlannedTrial(name, trial, skip))
+    return list(planned.values())
+
+
+def _program(formulation: str) -> Program | None:
+    """What a law needs a solver for; the oracle needs none."""
+    return None if formulation == ORACLE else program_of(make_formulation(formulation))
+
+
+def _solvers_for(study: Study, formulation: str, solvers: Sequence[str]) -> list[tuple[str, str]]:
+    """The solvers with which a law runs, each with the reason if the pair cannot work."""
+    program = _program(formulation)
+    parsed = [(text, parse_solver(text)) for text in solvers]
+    if program is None:
+        return [(NO_SOLVER, "")]
+    if not parsed:
+        raise DikbenchError(
+            f"study {study.name}: formulation {formulation!r} needs a solver, its cells name none"
+        )
+    return [(text, why_not(solver, program)) for text, solver in parsed]

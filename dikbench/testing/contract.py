@@ -1,0 +1,324 @@
+"""The contract that every formulation keeps, as checks for the author of a plug-in.
+
+    @pytest.mark.parametrize("check", dikbench.testing.CHECKS)
+    def test_contract(check):
+        check(MyLaw(), None)
+
+or, without pytest, `check_formulation(MyLaw())`. A check that fails raises `AssertionError` with
+the robot, the state and what was violated. The states are the same in every run: three arms inside,
+at and outside their limits and at exact singularities, asked for no, an ordinary and a huge twist,
+with and without a posture task, acceleration limits, rows G v <= h and a motion before.
+"""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable, Iterator
+from dataclasses import is_dataclass
+from typing import Final, NamedTuple, get_args
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.arrays import Array
+from dikbench.errors import DikbenchError
+from dikbench.problem.problem import DikProblem, Formulation, LimitKind, program_of, promises_of
+from dikbench.programs.quadratic_program import Program
+from dikbench.simulation.control_step import TrialEnded, control_step
+from dikbench.simulation.status import Status
+from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, Solver, parse_solver, why_not
+from dikbench.solvers.checked_solve import make_solve
+from dikbench.testing.states import State, states
+
+ROUNDING: Final = 1e-6
+"""A limit passed by less than this [rad/s], beyond the residual of the solver, is kept."""
+
+Check = Callable[[Formulation, str | None], None]
+
+
+class _Answer(NamedTuple):
+    """What a law gave: a velocity, or None and what it did instead; the solver's residual.
+
+    Of a law that solves several programs, each from what the last one gave, the residuals add up.
+    """
+
+    velocity: Array | None
+    status: Status
+    message: str
+    residual: float
+
+
+class _Asked:
+    """A law and the solver it is checked with."""
+
+    def __init__(self, formulation: Formulation, solver: str | None) -> None:
+        self.formulation = formulation
+        self.program = program_of(formulation)
+        self.solver: Solver | None = None
+        if self.program is not None:
+            self.solver = parse_solver(solver or DEFAULT_SOLVER[self.program])
+            reason = why_not(self.solver, self.program)
+            if reason:
+                raise DikbenchError(reason)
+
+    def answer(self, problem: DikProblem) -> _Answer:
+        """What the law gives, asked with a solver that remembers nothing."""
+        solve = make_solve(self.solver, self.program)
+        try:
+            outcome = control_step(self.formulation, problem, solve)
+        except TrialEnded as ended:
+            return _Answer(None, ended.status, str(ended), 0.0)
+        if outcome.status in {Status.INFEASIBLE, Status.SOLVER_FAILED}:
+            return _Answer(None, outcome.status, outcome.status.sentence, 0.0)
+        verdicts = solve.verdicts()
+        status = Status.NOT_VERIFIED if verdicts.lied[0] else outcome.status
+        residual = solve.calls * float(verdicts.primal[0])
+        return _Answer(outcome.velocity, status, status.sentence, residual)
+
+    def verified(self) -> Iterator[tuple[State, Array, float]]:
+        """Every state with an answer to judge: state, velocity, tolerance [rad/s].
+
+        A law may have no answer at some states, and a solver may be wrong at some; not at all.
+        """
+        answered = False
+        why = ""
+        for state in states():
+            answer = self.answer(state.problem)
+            if answer.velocity is not None and answer.status is Status.OK:
+                answered = True
+                yield state, answer.velocity, ROUNDING + answer.residual
+            else:
+                why = f"{state.label}: {answer.status.value}: {answer.message}"
+        if not answered:
+            raise AssertionError(f"no answer at any state; the last one, {why}")
+
+
+def check_declaration(formulation: Formulation, solver: str | None = None) -> None:
+    """The law is a frozen dataclass and declares only programs and limits that there are."""
+    name = type(formulation).__name__
+    parameters = getattr(formulation, "__dataclass_params__", None)
+    if isinstance(formulation, type) or not is_dataclass(formulation) or not parameters.frozen:
+        raise AssertionError(f"{name} is not an instance of a class with @dataclass(frozen=True)")
+    if program_of(formulation) not in {None, *get_args(Program)}:
+        valid = ", ".join(get_args(Program))
+        raise AssertionError(f"{name}.program is {program_of(formulation)!r}; valid: None, {valid}")
+    wrong = promises_of(formulation) - set(get_args(LimitKind))
+    if wrong:
+        valid = ", ".join(get_args(LimitKind))
+        raise AssertionError(f"{name}.keeps holds {sorted(wrong)}; valid: {valid}")
+
+
+def check_raises_only_cannot_answer(formulation: Formulation, solver: str | None = None) -> None:
+    """The law answers or raises `CannotAnswer`, and answers somewhere."""
+    asked = _Asked(formulation, solver)
+    for state in states():
+        answer = asked.answer(state.problem)
+        if answer.status is Status.FORMULATION_ERROR:
+            raise AssertionError(f"{state.label}: raised {answer.message}")
+    for _ in asked.verified():
+        break
+
+
+def check_shape(formulation: Formulation, solver: str | None = None) -> None:
+    """The velocity is an array of nv floats."""
+    asked = _Asked(formulation, solver)
+    for state in states():
+        answer = asked.answer(state.problem)
+        if answer.status is Status.WRONG_SHAPE:
+            raise AssertionError(f"{state.label}: wrong shape: {answer.message}")
+        if answer.velocity is not None and answer.velocity.dtype != np.float64:
+            raise AssertionError(f"{state.label}: expected floats, got {answer.velocity.dtype}")
+
+
+def check_finite(formulation: Formulation, solver: str | None = None) -> None:
+    """The velocity holds neither NaN nor infinity."""
+    asked = _Asked(formulation, solver)
+    for state in states():
+        answer = asked.answer(state.problem)
+        if answer.status is Status.NOT_FINITE:
+            raise AssertionError(f"{state.label}: not finite: {answer.message}")
+
+
+def check_inputs_untouched(formulation: Formulation, solver: str | None = None) -> None:
+    """The law leaves everything that it was handed as it was."""
+    asked = _Asked(formulation, solver)
+    for state in states():
+        before = {name: np.array(value) for name, value in _inputs(state.problem).items()}
+        asked.answer(state.problem)
+        after = _inputs(state.problem)
+        for name in before.keys() | after.keys():
+            if name not in before or name not in after:
+                raise AssertionError(f"{state.label}: the law replaced problem.{name}")
+            if not np.array_equal(before[name], np.asarray(after[name])):
+                raise AssertionError(f"{state.label}: the law changed problem.{name}")
+
+
+def _inputs(problem: DikProblem) -> dict[str, Array | float]:
+    """The numbers that a law is handed, by the name under which it finds them."""
+    found: dict[str, Array | float | None] = {
+        "q": problem.q,
+        "v_prev": problem.v_prev,
+        "dt": problem.dt,
+        "limits.to_lower": problem.limits.to_lower,
+        "limits.to_upper": problem.limits.to_upper,
+        "robot.q0": problem.robot.q0,
+        "G": problem.G,
+        "h": problem.h,
+    }
+    for number, task in enumerate(problem.tasks):
+        for name in ("J", "V", "error", "weight", "priority"):
+            found[f"tasks[{number}].{name}"] = getattr(task, name)
+    for kind in ("position", "velocity", "acceleration", "effort"):
+        interval = getattr(problem.limits.joint, kind)
+        if interval is not None:
+            found[f"limits.joint.{kind}.lower"] = interval.lower
+            found[f"limits.joint.{kind}.upper"] = interval.upper
+    return {name: value for name, value in found.items() if value is not None}
+
+
+def check_repeatable(formulation: Formulation, solver: str | None = None) -> None:
+    """The same problem gives the same velocity, bit for bit, whatever was asked in between."""
+    _compare(_Asked(formulation, solver), _Asked(formulation, solver), "asked again")
+
+
+def check_picklable(formulation: Formulation, solver: str | None = None) -> None:
+    """The law survives pickling, and the copy gives the same velocities, bit for bit."""
+    try:
+        unpickled = pickle.loads(pickle.dumps(formulation))
+    except Exception as error:
+        raise AssertionError(
+            f"{type(formulation).__name__} cannot be pickled ({error}); workers are processes: "
+            "define the class at the top of a module, with parameters that pickle"
+        ) from error
+    _compare(_Asked(formulation, solver), _Asked(unpickled, solver), "unpickled")
+
+
+def _compare(first: _Asked, second: _Asked, what: str) -> None:
+    """Ask one forwards through the states, the other backwards, with other scratch data."""
+    velocities = [first.answer(state.problem).velocity for state in states()]
+    for v, state in reversed([*zip(velocities, states(), strict=True)]):
+        robot = state.problem.robot
+        pin.computeJointJacobians(robot.model, robot.scratch, robot.q0)
+        w = second.answer(state.problem).velocity
+        if v is w is None or (v is not None and w is not None and np.array_equal(v, w)):
+            continue
+        raise AssertionError(f"{state.label}: gave {v}, {what} {w}")
+
+
+def check_position_limits(formulation: Formulation, solver: str | None = None) -> None:
+    """Where promised: q + v dt is inside the position limits, and no joint outside goes further."""
+    _check_promise("position", formulation, solver)
+
+
+def check_velocity_limits(formulation: Formulation, solver: str | None = None) -> None:
+    """Where promised: v is inside the velocity limits."""
+    _check_promise("velocity", formulation, solver)
+
+
+def check_acceleration_limits(formulation: Formulation, solver: str | None = None) -> None:
+    """Where promised, in force and not relaxed: (v - v_prev)/dt is inside the limits."""
+    _check_promise("acceleration", formulation, solver)
+
+
+def check_inequalities(formulation: Formulation, solver: str | None = None) -> None:
+    """Where promised: G v <= h, at states where the law has an answer."""
+    _check_promise("inequalities", formulation, solver)
+
+
+def _check_promise(kind: LimitKind, formulation: Formulation, solver: str | None) -> None:
+    if kind in promises_of(formulation):
+        for state, v, tolerance in _Asked(formulation, solver).verified():
+            assert_within(state, kind, v, tolerance)
+
+
+def _allowed(problem: DikProblem, kind: LimitKind) -> tuple[Array, Array] | None:
+    """The velocities that a kind of limit allows, (nv,) each; None where it is not in force."""
+    limits, dt = problem.limits, problem.dt
+    if kind == "position":
+        if limits.to_lower is None or limits.to_upper is None:
+            return None
+        return -np.maximum(limits.to_lower, 0) / dt, np.maximum(limits.to_upper, 0) / dt
+    if kind == "velocity":
+        velocity = limits.joint.velocity
+        return None if velocity is None else (velocity.lower, velocity.upper)
+    acceleration, v_prev = limits.joint.acceleration, problem.v_prev
+    if acceleration is None or v_prev is None or problem.relaxed:
+        return None
+    return v_prev + acceleration.lower * dt, v_prev + acceleration.upper * dt
+
+
+def assert_within(state: State, kind: LimitKind, v: Array, tolerance: float) -> None:
+    """Assert that a velocity (nv,) keeps one kind of limits at a state, to a tolerance [rad/s]."""
+    if kind == "inequalities":
+        _assert_inequalities(state, v, tolerance)
+        return
+    allowed = _allowed(state.problem, kind)
+    if allowed is None:
+        return
+    lower, upper = allowed
+    excess = np.maximum(lower - v, v - upper)
+    worst = int(np.argmax(excess))
+    if excess[worst] > tolerance:
+        raise AssertionError(
+            f"{state.label}: joint {worst} passes its {kind} limit: {v[worst]:.9g} rad/s, allowed "
+            f"from {lower[worst]:.9g} to {upper[worst]:.9g}"
+        )
+
+
+def _assert_inequalities(state: State, v: Array, tolerance: float) -> None:
+    G, h = state.problem.G, state.problem.h
+    if G is None or h is None:
+        return
+    excess = G @ v - h
+    worst = int(np.argmax(excess))
+    if excess[worst] > tolerance:
+        raise AssertionError(
+            f"{state.label}: row {worst} of G v <= h is passed by {excess[worst]:.9g} rad/s"
+        )
+
+
+def check_state(formulation: Formulation, state: State, solver: str | None = None) -> None:
+    """At one state of your own making: a velocity inside the promised limits, or `CannotAnswer`.
+
+    For property-based tests; the answer of a solver that is wrong there is not judged.
+
+    Raises:
+        AssertionError: if the law raises, answers with a wrong shape or NaN, or breaks a promise.
+    """
+    answer = _Asked(formulation, solver).answer(state.problem)
+    if answer.status in {Status.FORMULATION_ERROR, Status.WRONG_SHAPE, Status.NOT_FINITE}:
+        raise AssertionError(f"{state.label}: {answer.status.value}: {answer.message}")
+    if answer.velocity is not None and answer.status is Status.OK:
+        for kind in promises_of(formulation):
+            assert_within(state, kind, answer.velocity, ROUNDING + answer.residual)
+
+
+CHECKS: Final[tuple[Check, ...]] = (
+    check_declaration,
+    check_raises_only_cannot_answer,
+    check_shape,
+    check_finite,
+    check_inputs_untouched,
+    check_repeatable,
+    check_picklable,
+    check_position_limits,
+    check_velocity_limits,
+    check_acceleration_limits,
+    check_inequalities,
+)
+"""Every check: (formulation, solver's selector or None for the default) -> None."""
+
+
+def check_formulation(formulation: Formulation, solver: str | None = None) -> None:
+    """Run every check on a law.
+
+    Args:
+        formulation: the law, with its parameters set.
+        solver: a solver's selector; default: the one that a law of this program gets by default.
+
+    Raises:
+        AssertionError: if the law breaks its contract.
+        DikbenchError: if the solver is unknown or cannot take what the law needs solved.
+    """
+    for check in CHECKS:
+        check(formulation, solver)

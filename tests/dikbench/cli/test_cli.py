@@ -1,0 +1,345 @@
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from dikbench.cli.listing import listing
+from dikbench.metrics import METRICS
+from dikbench.plugins.registry import plugins
+
+LAW = '''
+from __future__ import annotations
+from dataclasses import dataclass
+
+@dataclass(frozen=True)
+class MyLaw:
+    """The transpose of the Jacobian.
+
+    Source: a test.
+    """
+
+    gain: float = 1.0
+
+    def velocity(self, problem, solve):
+        return self.gain * problem.primary.J.T @ problem.primary.V
+'''
+
+
+def dikbench(
+    *arguments: str, cwd: Path, path: Path | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Run the command line in a process of its own."""
+    environment = dict(os.environ)
+    if path is not None:
+        environment["PYTHONPATH"] = str(path)
+    return subprocess.run(
+        [sys.executable, "-c", "from dikbench.cli import main; main()", *arguments],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        env=environment,
+        timeout=300,
+        check=False,
+    )
+
+
+def test_help_does_not_import_anything_heavy() -> None:
+    """`dikbench --help` imports neither numpy nor Pinocchio nor pandas."""
+    code = (
+        "import sys\n"
+        "from dikbench.cli import commands\n"
+        "commands.main(['--help'], standalone_mode=False)\n"
+        "heavy = {'numpy', 'pinocchio', 'pandas', 'scipy', 'qpsolvers', 'cvxpy', 'matplotlib'}\n"
+        "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "run" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (("run", "nosuch"), ("nosuch", "quick")),
+        (("run", "--formulation", "dls[damping=many]"), ("damping", "float")),
+        (("run", "--formulation", "dls[dampin=1]"), ("dampin", "valid: damping")),
+        (("run", "--formulation", "nofile.py:Law"), ("nofile.py",)),
+        (("run", "--solver", "osqp[eps=1]"), ("eps", "eps_abs")),
+        (("run", "--scenario", "reach[robot=bad.urdf,frame=tip]"), ("bad.urdf", "URDF")),
+        (("run", "--scenario", "near-miss[robot=talos,singularity=wrist]"), ("wrist", "elbow")),
+        (("run", "--scenario", "reach[gain=1||2]"), ("gain", "empty")),
+        (("run", "--plant", "ideal[delay=-1]"), ("delay=-1", "0 to")),
+        (("run", "train", "--seed", "0"), ("seed 0", "1 to 99")),
+        (("show", "near-miss", "--figure", "a.gif"), ("a.gif", ".svg, .png, .pdf")),
+        (("show", "near-miss", "--figure", "no/such/a.png"), ("no/such/a.png", "No such file")),
+        (("show", "dls", "--figure", "a.png"), ("dls", "near-miss")),
+        (("run", "--scenario", "reach[duration=1e15]"), ("steps", "valid")),
+        (("run", "--plant", "perfect"), ("perfect", "ideal")),
+        (("run", "--reference", "space"), ("space", "path")),
+        (("run", "--seed", "-1"), ("-1",)),
+        (("run", "--out", "afile/inside", "--formulation", "dls"), ("afile/inside",)),
+        (("recompute", "nowhere"), ("no results", "nowhere")),
+        (("list", "laws"), ("laws", "formulations")),
+        (("show", "nothing"), ("nothing", "valid")),
+        (("--plnt",), ("--plnt",)),
+    ],
+)
+def test_malformed_input_is_one_line_and_exit_code_two(
+    tmp_path: Path, arguments: tuple[str, ...], expected: tuple[str, ...]
+) -> None:
+    """Whatever is wrong with a command: one line, exit code 2, no traceback, nothing written."""
+    (tmp_path / "bad.urdf").write_text("<robot name='x'>")
+    (tmp_path / "afile").touch()
+    before = sorted(tmp_path.rglob("*"))
+    done = dikbench(*arguments, cwd=tmp_path)
+    assert done.returncode == 2, done.stderr
+    assert done.stdout == ""
+    assert len(done.stderr.strip().splitlines()) == 1, done.stderr
+    assert done.stderr.startswith("error: ")
+    for part in expected:
+        assert part in done.stderr
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_failed_command_touches_no_earlier_results(tmp_path: Path) -> None:
+    """A malformed second run leaves the files of the first as they were."""
+    out = tmp_path / "out"
+    good = dikbench(
+        "run", "--formulation", "dls", "--scenario", "reach", "--plant", "ideal",
+        "--out", str(out), cwd=tmp_path,
+    )  # fmt: skip
+    assert good.returncode == 0, good.stderr
+    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    assert dikbench("run", "--formulation", "dlss", "--out", str(out), cwd=tmp_path).returncode == 2
+    assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
+
+
+def test_a_plugin_of_another_project_is_listed_and_runs(tmp_path: Path) -> None:
+    """A project with its own entry points adds a law and a family without touching dikbench."""
+    site = tmp_path / "site"
+    info = site / "my_project-1.0.dist-info"
+    info.mkdir(parents=True)
+    (site / "my_laws.py").write_text(LAW + '\nFORMULATIONS = {"my-law": MyLaw}\n')
+    (site / "my_scenarios.py").write_text(
+        "from scenarios.reach import reach\n"
+        "def my_family(distance: float = 0.05, *, seed: int = 0):\n"
+        '    """A short reach."""\n'
+        "    return reach(distance=distance, seed=seed)\n"
+        'SCENARIOS = {"my-family": my_family}\n'
+    )
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my-project\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(
+        "[dikbench.formulations]\nmine = my_laws\n[dikbench.scenarios]\nmine = my_scenarios\n"
+    )
+    listed = dikbench("list", cwd=tmp_path, path=site)
+    assert listed.returncode == 0, listed.stderr
+    assert "my-law" in listed.stdout
+    assert "my-family" in listed.stdout
+    done = dikbench(
+        "run", "--formulation", "my-law[gain=2]", "--scenario", "my-family[distance=0.1]",
+        "--plant", "ideal", "--out", "out", cwd=tmp_path, path=site,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    trials = pd.read_csv(tmp_path / "out" / "trials.csv")
+    assert list(trials["formulation"]) == ["my-law[gain=2]"]
+    assert list(trials["status"]) == ["ok"]
+
+
+def test_a_law_in_a_file_runs_without_packaging(tmp_path: Path) -> None:
+    """`path/to/file.py:Class` is resolved in each worker from its text, with parameters."""
+    (tmp_path / "my_law.py").write_text(LAW)
+    done = dikbench(
+        "run", "--formulation", "my_law.py:MyLaw", "--formulation", "my_law.py:MyLaw[gain=2]",
+        "--scenario", "reach", "--out", "out", cwd=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    trials = pd.read_csv(tmp_path / "out" / "trials.csv")
+    assert set(trials["status"]) == {"ok"}
+    by_law = trials[trials["plant"] == "ideal"].set_index("formulation")["progress_mean"]
+    assert by_law["my_law.py:MyLaw[gain=2]"] > by_law["my_law.py:MyLaw"]
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("qp", "min_v"),
+        ("near-miss[miss=0.05]", "required speed over limit"),
+        ("osqp", "eps_abs"),
+        ("panda", "panda_hand_tcp"),
+        ("off_course_max_rad", "unit: rad"),
+        ("quick", "[[cells]]"),
+    ],
+)
+def test_show_prints_one_thing_in_full(tmp_path: Path, name: str, expected: str) -> None:
+    """`dikbench show` knows laws, scenarios, solvers, robots, metrics and studies."""
+    done = dikbench("show", name, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert expected in done.stdout
+
+
+SHORT = ("--formulation", "dls", "--scenario", "reach[duration=0.2]", "--plant", "ideal")
+
+
+def test_time_and_status_work_on_a_folder(tmp_path: Path) -> None:
+    """Times alone first, then the trials, then what is there."""
+    timed = dikbench("time", *SHORT, "--out", "out", cwd=tmp_path)
+    assert timed.returncode == 0, timed.stderr
+    assert "Timing of one call" in timed.stdout
+    assert list(pd.read_csv(tmp_path / "out" / "timing.csv")["formulation"]) == ["dls"]
+    missing = dikbench("status", "out", cwd=tmp_path)
+    assert missing.stdout.split() == ["1", "missing", "1", "planned"]
+    assert dikbench("run", *SHORT, "--out", "out", cwd=tmp_path).returncode == 0
+    assert dikbench("status", "out", cwd=tmp_path).stdout.split() == ["1", "ok", "1", "planned"]
+    again = dikbench("run", *SHORT, "--out", "out", cwd=tmp_path)
+    assert "1 of 1 trials are done" in again.stderr
+    nothing = dikbench("status", "nosuch", cwd=tmp_path)
+    assert nothing.returncode == 2
+    assert nothing.stderr.startswith("error: no results in")
+    assert not (tmp_path / "nosuch").exists()
+
+
+def test_ctrl_c_keeps_what_is_finished_and_says_how_to_go_on(tmp_path: Path) -> None:
+    """Exit code 130, the rows so far, and the command."""
+    arguments = ["run", *SHORT, "--out", "out", "--jobs", "1"]
+    for seed in range(400):
+        arguments += ["--seed", str(seed)]
+    process = subprocess.Popen(
+        [sys.executable, "-c", "from dikbench.cli import main; main()", *arguments],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        text=True,
+        cwd=tmp_path,
+    )
+    store = tmp_path / "out" / "results.sqlite"
+    for _ in range(600):
+        time.sleep(0.1)
+        if store.exists():
+            try:
+                with sqlite3.connect(store) as database:
+                    if database.execute("SELECT COUNT(*) FROM trials").fetchone()[0] >= 5:
+                        break
+            except sqlite3.OperationalError:
+                continue  # its tables are not there yet
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130, said
+    assert "of 400 trials are done and kept; to continue: dikbench run" in said
+    assert "Traceback" not in said
+    assert 5 <= len(pd.read_csv(tmp_path / "out" / "trials.csv")) < 400
+
+
+@pytest.mark.skipif(not Path("/dev/shm").is_dir() or os.geteuid() != 0, reason="needs a tmpfs")
+def test_a_full_disk_is_one_line_and_what_was_committed_is_kept(tmp_path: Path) -> None:
+    """On a file system of one megabyte."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(disk)]
+    if subprocess.run(mount, capture_output=True, check=False).returncode:
+        pytest.skip("mounting is not allowed here")
+    try:
+        arguments = ["run", *SHORT, "--scenario", "reach", "--out", str(disk / "out")]
+        for seed in range(30):
+            arguments += ["--seed", str(seed)]
+        done = dikbench(*arguments, cwd=tmp_path)
+        assert done.returncode == 2, done.stderr
+        last = done.stderr.splitlines()[-1]
+        assert last.startswith("error: ")
+        assert "space" in last or "full" in last
+        assert "Traceback" not in done.stderr
+        shutil.copytree(disk / "out", tmp_path / "copy")
+        with sqlite3.connect(tmp_path / "copy" / "results.sqlite") as database:
+            assert database.execute("PRAGMA integrity_check").fetchone() == ("ok",)
+            assert database.execute("SELECT COUNT(*) FROM trials").fetchone()[0] > 0
+    finally:
+        subprocess.run(["umount", str(disk)], check=True)
+
+
+SPINNING = """
+from dataclasses import dataclass
+
+@dataclass(frozen=True)
+class Spin:
+    def velocity(self, problem, solve):
+        while True:
+            pass
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such signal")
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_no_worker_outlives_its_driver(tmp_path: Path, how: signal.Signals) -> None:
+    """However the driver ends, a law that loops for ever ends with it."""
+    (tmp_path / "spin.py").write_text(SPINNING)
+    arguments = ["run", "--formulation", "spin.py:Spin", *SHORT[2:], "--out", "out", "--jobs", "1"]
+    process = subprocess.Popen(
+        [sys.executable, "-c", "from dikbench.cli import main; main()", *arguments],
+        stderr=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        cwd=tmp_path,
+    )
+    time.sleep(8)
+    assert len(_processes_in(tmp_path)) >= 2
+    process.send_signal(how)
+    process.wait(timeout=30)
+    for _ in range(100):
+        if not _processes_in(tmp_path):
+            break
+        time.sleep(0.1)
+    assert not _processes_in(tmp_path)
+
+
+def _processes_in(folder: Path) -> list[str]:
+    """The processes whose working folder this is."""
+    found = []
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            if os.readlink(process / "cwd") == str(folder):
+                found.append(process.name)
+        except OSError:  # gone, or not ours
+            continue
+    return found
+
+
+@pytest.mark.parametrize("ending", ["svg", "png", "pdf"])
+def test_a_scenario_is_shown_with_its_certificate_and_its_picture(
+    tmp_path: Path, ending: str
+) -> None:
+    """The claims, what the motion asks for, what a seed perturbs; and a figure of its kind."""
+    name = f"picture.{ending}"
+    done = dikbench("show", "near-miss[robot=panda,miss=0.01]", "--figure", name, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    for part in (
+        "Certificate of near-miss[robot=panda,miss=0.01]:",
+        "smallest singular value (m, rad): ",
+        "margin to the position limits [rad]: ",
+        "required speed over limit: up to ",
+        "reach from the first joint [m]: ",
+        "A seed perturbs: start by up to 0.1 rad per joint, timing by up to 10 %.",
+        name,
+    ):
+        assert part in done.stdout
+    content = (tmp_path / name).read_bytes()
+    begins = {"svg": b"<?xml", "png": bytes.fromhex("89504e470d0a1a0a"), "pdf": b"%PDF"}
+    assert content.startswith(begins[ending])
+    assert len(content) > 5000
+
+
+def test_every_listed_scenario_says_what_it_provokes_and_which_metric_shows_it() -> None:
+    """One line each, and the metrics are there."""
+    for family in plugins("scenario").values():
+        assert family.paragraph("Provokes"), family.name
+        shown = [name.strip() for name in family.paragraph("Shows in").split(",")]
+        assert shown
+        assert set(shown) <= set(METRICS), family.name
+    lines = listing("scenarios")
+    assert len(lines) == len(plugins("scenario"))
+    assert any("near a singularity" in line and "velocity_peak_ratio" in line for line in lines)

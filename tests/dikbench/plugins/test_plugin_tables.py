@@ -1,0 +1,251 @@
+"""Tables of plug-ins: how they are found, checked and built, and the errors of wrong ones."""
+
+from __future__ import annotations
+
+import importlib.metadata
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+from dikbench.errors import DikbenchError
+from dikbench.plugins.registry import (
+    make_formulation,
+    make_scenario,
+    plugins,
+    scenario_plugin,
+)
+from formulations.damped_least_squares import DampedLeastSquares
+from formulations.pseudo_inverse import PseudoInverse
+from scenarios.reach import reach
+
+
+class _EntryPoint:
+    """An entry point whose module is made on the spot."""
+
+    def __init__(self, name: str, load: Callable[[], ModuleType]) -> None:
+        self.name = name
+        self.value = f"{name}_module"
+        self.load = load
+
+
+Install = Callable[..., None]
+
+
+@pytest.fixture
+def install(monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
+    """Replace every registered plug-in; each argument is a module, a table or a loader."""
+
+    def replace_all(group: str, **entries: Any) -> None:
+        points = []
+        for name, entry in entries.items():
+            if isinstance(entry, ModuleType):
+                points.append(_EntryPoint(name, lambda module=entry: module))
+            elif callable(entry):
+                points.append(_EntryPoint(name, entry))
+            else:
+                module = ModuleType(name)
+                module.__file__ = f"/somewhere/{name}.py"
+                setattr(module, group.removeprefix("dikbench.").upper(), entry)
+                points.append(_EntryPoint(name, lambda module=module: module))
+        known = {group: points}
+        monkeypatch.setattr(
+            importlib.metadata, "entry_points", lambda *, group: known.get(group, [])
+        )
+        plugins.cache_clear()
+
+    yield replace_all
+    monkeypatch.undo()
+    plugins.cache_clear()
+
+
+def _laws(**table: Any) -> Mapping[str, Any]:
+    return {name.replace("_", "-"): build for name, build in table.items()}
+
+
+def _message(call: Callable[..., object], *args: object) -> str:
+    with pytest.raises(DikbenchError) as caught:
+        call(*args)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def _law_with(tmp_path: Path, fields: str, imports: str = "") -> str:
+    path = tmp_path / "law.py"
+    path.write_text(
+        "from __future__ import annotations\n"
+        "from dataclasses import dataclass\n"
+        f"{imports}\n"
+        "@dataclass(frozen=True)\n"
+        "class Law:\n"
+        f"    {fields}\n"
+        "    def velocity(self, problem, solve):\n"
+        "        return None\n"
+    )
+    return f"{path}:Law"
+
+
+# --- tables of other projects
+
+
+def test_a_table_of_another_project_is_found(install: Install) -> None:
+    """Two lines in its own project: an entry point and a mapping."""
+    install("dikbench.formulations", theirs=_laws(their_dls=DampedLeastSquares))
+    assert set(plugins("formulation")) == {"their-dls"}
+    assert make_formulation("their-dls[damping=0.5]") == DampedLeastSquares(0.5)
+
+
+def test_a_table_may_hold_a_law_with_its_parameters_set(install: Install) -> None:
+    """An instance: its values are the defaults, a selector still replaces them."""
+    install("dikbench.formulations", theirs=_laws(soft=DampedLeastSquares(damping=0.2)))
+    assert make_formulation("soft") == DampedLeastSquares(0.2)
+    assert make_formulation("soft[damping=0.3]") == DampedLeastSquares(0.3)
+    assert plugins("formulation")["soft"].parameters["damping"].default == 0.2
+    assert "did you mean 'damping'?" in _message(make_formulation, "soft[dampin=1]")
+
+
+def test_the_parameters_that_an_instance_has_need_not_be_given(
+    install: Install, tmp_path: Path
+) -> None:
+    """Also where the class itself has no default for them."""
+    law: Any = make_formulation(_law_with(tmp_path, "gain: float") + "[gain=2]")
+    install("dikbench.formulations", theirs=_laws(ready=law))
+    assert make_formulation("ready") == law
+
+
+def test_a_table_may_hold_partial_calls(install: Install) -> None:
+    """functools.partial sets parameters of a family or a class as one would expect."""
+    install("dikbench.scenarios", theirs={"ur5-reach": partial(reach, robot="ur5", dt=0.05)})
+    scenario = make_scenario("ur5-reach[dt=0.02]", seed=1)
+    assert (scenario.robot.name, scenario.dt) == ("ur5", 0.02)
+    assert make_scenario("ur5-reach").dt == 0.05
+    assert scenario_plugin("ur5-reach").summary == plugins("scenario")["ur5-reach"].summary != ""
+    install("dikbench.formulations", theirs=_laws(soft=partial(DampedLeastSquares, damping=0.2)))
+    assert make_formulation("soft") == DampedLeastSquares(0.2)
+    assert make_formulation("soft[damping=0.3]") == DampedLeastSquares(0.3)
+
+
+def test_two_plugins_of_one_name_are_an_error_that_names_both_files(install: Install) -> None:
+    """Neither wins silently."""
+    install(
+        "dikbench.formulations",
+        ours=_laws(dls=DampedLeastSquares),
+        theirs=_laws(dls=PseudoInverse),
+    )
+    message = _message(make_formulation, "dls")
+    assert message.startswith("two plug-ins are called 'dls'")
+    assert "damped_least_squares.py" in message
+    assert "pseudo_inverse.py" in message
+
+
+@pytest.mark.parametrize("build", [DampedLeastSquares, DampedLeastSquares(0.2)])
+def test_the_same_plugin_twice_is_no_conflict(install: Install, build: object) -> None:
+    """One table that is named by two entry points (an editable install beside an old one)."""
+    table = _laws(dls=build)
+    install("dikbench.formulations", ours=table, again=table)
+    assert set(plugins("formulation")) == {"dls"}
+
+
+def test_a_module_without_a_table_is_named(install: Install) -> None:
+    """PyPI has unrelated packages of the same names: the file tells which one was loaded."""
+    module = ModuleType("formulations")
+    module.__file__ = "/elsewhere/formulations/__init__.py"
+    install("dikbench.formulations", builtin=module)
+    assert _message(make_formulation, "dls") == (
+        "plug-in 'builtin' of dikbench.formulations: /elsewhere/formulations/__init__.py holds no "
+        "mapping FORMULATIONS"
+    )
+
+
+def test_a_table_of_the_wrong_type_is_named(install: Install) -> None:
+    """A list is no mapping."""
+    module = ModuleType("theirs")
+    module.FORMULATIONS = [DampedLeastSquares]  # type: ignore[attr-defined]
+    install("dikbench.formulations", theirs=module)
+    assert "holds no mapping FORMULATIONS" in _message(make_formulation, "dls")
+
+
+def test_a_plugin_that_cannot_be_imported_is_named(install: Install) -> None:
+    """With the entry point, its module and the reason."""
+
+    def load() -> ModuleType:
+        raise ImportError("no module named theirs")
+
+    install("dikbench.scenarios", theirs=load)
+    message = _message(make_scenario, "reach")
+    assert message == (
+        "plug-in 'theirs' of dikbench.scenarios (theirs_module) cannot be imported: "
+        "ImportError: no module named theirs"
+    )
+
+
+@pytest.mark.parametrize("kind", ["formulation", "scenario"])
+def test_without_any_plugin_the_cure_is_given(install: Install, kind: str) -> None:
+    """An uninstalled checkout is an error with its cure, never an empty table."""
+    install("dikbench.nothing")
+    make: Callable[[str], object] = make_formulation if kind == "formulation" else make_scenario
+    message = _message(make, "reach")
+    assert f"no {kind}s are registered" in message
+    assert "pip install -e ." in message
+
+
+@pytest.mark.parametrize("name", ["two words", "a[b]", "a,b", "a=b", "", 3, None])
+def test_a_name_that_no_selector_could_say_is_an_error(install: Install, name: object) -> None:
+    """Brackets, commas, blanks, nothing, or no text at all."""
+    install("dikbench.formulations", theirs={name: DampedLeastSquares})
+    assert "is not a name" in _message(make_formulation, "dls")
+
+
+@pytest.mark.parametrize("build", [3, "dls", None])
+def test_an_entry_that_cannot_be_called_is_named(install: Install, build: object) -> None:
+    """A table holds classes, instances or functions."""
+    install("dikbench.formulations", theirs={"theirs": build})
+    assert _message(make_formulation, "theirs") == (
+        "/somewhere/theirs.py: formulation 'theirs' is not callable"
+    )
+
+
+def test_a_formulation_without_velocity_is_an_error(install: Install) -> None:
+    """The message says which method is missing, and in which file."""
+    install("dikbench.formulations", theirs={"dict": dict})
+    assert "'dict' has no method velocity(problem, solve)" in _message(make_formulation, "dict")
+
+
+def test_a_family_must_return_a_scenario(install: Install) -> None:
+    """The message says what it returned instead."""
+
+    def nothing(seed: int = 0) -> None:
+        """Return nothing at all."""
+
+    install("dikbench.scenarios", theirs={"nothing": nothing})
+    message = _message(make_scenario, "nothing")
+    assert message.endswith("scenario 'nothing' returned NoneType, not a Scenario")
+    assert message.startswith(__file__)
+
+
+def test_a_family_without_seeds_takes_only_zero(install: Install) -> None:
+    """A seed that would be ignored is an error, not a repetition."""
+
+    def fixed() -> object:
+        """One scenario."""
+        return reach("planar3r")
+
+    install("dikbench.scenarios", theirs={"fixed": fixed})
+    assert make_scenario("fixed", 0).robot.name == "planar3r"
+    assert _message(make_scenario, "fixed", 1) == "scenario family 'fixed' takes no seed; valid: 0"
+
+
+def test_a_parameter_without_annotation_has_the_type_of_its_default(install: Install) -> None:
+    """Plug-ins need not be annotated."""
+
+    def plain(distance=0.1, robot="planar3r", acceleration=False, seed=0):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+        """Reach with other defaults."""
+        return reach(robot, distance=distance, acceleration=acceleration, seed=seed)
+
+    install("dikbench.scenarios", theirs={"plain": plain})
+    scenario = make_scenario("plain[distance=0.05,acceleration=true]")
+    assert scenario.robot.limits.acceleration is not None
+    assert "distance='far' is not valid" in _message(make_scenario, "plain[distance=far]")

@@ -1,0 +1,151 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from dikbench.plugins.registry import make_scenario, plugins
+from dikbench.report.contents.docstring import parse_docstring
+from dikbench.report.contents.laws_and_families import families_of, laws_of
+from dikbench.report.sentences.situations import (
+    AT_LIMITS,
+    CONSTRAINED,
+    FREE,
+    OUTSIDE,
+    SINGULAR,
+    TOO_FAST,
+    UNKNOWN,
+    UNREACHABLE,
+    Situation,
+    situation_of,
+)
+
+MakeRows = Callable[..., pd.DataFrame]
+
+LAW = '''
+raise SystemExit("this file was run")
+
+class Mine:
+    """A law of mine: slowly.
+
+        v = gain J^T V
+
+    What it is good at.
+
+    Attributes:
+        gain: how much [rad/m],
+            and more.
+
+    Source: [Mine2026].
+    """
+
+    gain: float = 0.5
+    after: str = "clip"
+    program: ClassVar[str] = "qp"
+'''
+
+
+def test_a_law_given_as_a_file_is_read_and_not_run(tmp_path: Path, make_rows: MakeRows) -> None:
+    """Results name files; remaking a report takes the docstring from them and executes nothing."""
+    file = tmp_path / "mine.py"
+    file.write_text(LAW)
+    [law] = laws_of(make_rows({f"{file}:Mine[gain=2]": {}}))
+    assert law.text is not None
+    assert law.text.summary == "A law of mine: slowly."
+    assert law.text.titled == {"Source": "[Mine2026]"}
+    assert law.text.entries == {"gain": "how much [rad/m], and more."}
+    assert law.variants[0].attributes == {"gain": "2", "after": "'clip'"}
+
+
+@pytest.mark.parametrize("content", [None, "", "def f(", "\x00", "class Other: pass"])
+def test_a_law_whose_file_says_nothing_is_named_all_the_same(
+    tmp_path: Path, make_rows: MakeRows, content: str | None
+) -> None:
+    """A file that is gone, empty or no Python leaves the law without a text."""
+    if content is not None:
+        (tmp_path / "mine.py").write_text(content)
+    [law] = laws_of(make_rows({f"{tmp_path / 'mine.py'}:Mine": {}}))
+    assert law.text is None
+    assert law.name.endswith("mine.py:Mine")
+
+
+def test_variants_of_a_law_stand_together_with_every_attribute(make_rows: MakeRows) -> None:
+    """What was given goes before the defaults; solvers are those with which it ran."""
+    rows = make_rows(
+        {
+            ("qp", "daqp"): {},
+            ("qp", "osqp"): {},
+            "oracle": {},
+            ("qp[damping=0.1]", "daqp"): {},
+            "unheard-of": {},
+        }
+    )
+    qp, unheard_of, oracle = laws_of(rows)
+    assert [variant.selector for variant in qp.variants] == ["qp", "qp[damping=0.1]"]
+    assert qp.variants[0].solvers == ("daqp", "osqp")
+    assert [variant.attributes["damping"] for variant in qp.variants] == ["0.001", "0.1"]
+    assert any(text.startswith("[Tedrake] R. Tedrake.") for text in qp.references)
+    assert unheard_of.text is None
+    assert oracle.name == "oracle"
+
+
+@pytest.mark.parametrize("kind", ["formulation", "scenario"])
+def test_every_shipped_docstring_is_taken_apart(kind: str) -> None:
+    """Nothing of a docstring is lost: each of its words stands in one of the parts."""
+    for plugin in plugins(kind).values():
+        text = plugin.documented.__doc__ or ""
+        parsed = parse_docstring(text)
+        assert parsed.summary == plugin.summary
+        assert "Source" in parsed.titled
+        assert set(parsed.entries) >= {name for name in plugin.parameters if f"{name}:" in text}, (
+            plugin.name
+        )
+        parts = [
+            parsed.summary,
+            *(paragraph.text for paragraph in parsed.paragraphs),
+            *(f"{name}: {said}" for name, said in parsed.entries.items()),
+            *(f"{title}: {said}." for title, said in parsed.titled.items()),
+        ]
+        words = set(" ".join(parts).replace(",", " ").replace(":", " ").replace(".", " ").split())
+        lost = set(text.replace(",", " ").replace(":", " ").replace(".", " ").split()) - words
+        assert lost <= {"Attributes", "Args"}, plugin.name
+
+
+def test_families_say_what_they_certify(make_rows: MakeRows) -> None:
+    """The claims are those of the scenario itself; what cannot be built says why."""
+    selectors = ("near-miss[miss=0.02]", "near-miss[miss=-1]", "unheard-of")
+    near_miss, unheard_of = families_of(make_rows({"pinv": {}}, selectors))
+    claims = make_scenario(selectors[0]).certificate.claims
+    assert near_miss.scenarios[0].claims == tuple(str(claim) for claim in claims)
+    assert "miss" in near_miss.scenarios[1].problem
+    assert near_miss.text is not None
+    assert near_miss.text.titled["Provokes"].startswith("joint speeds beyond the limits")
+    assert unheard_of.text is None
+    assert "unheard-of" in unheard_of.scenarios[0].problem
+
+
+@pytest.mark.parametrize(
+    ("scenario", "situation"),
+    [
+        ("obstacle[where=elbow]", CONSTRAINED),
+        ("torque-limited", CONSTRAINED),
+        ("reach", UNREACHABLE),
+        ("workspace-boundary", UNREACHABLE),
+        ("start-outside", OUTSIDE),
+        ("joint-limit-crossing", AT_LIMITS),
+        ("joint-limit-approach", AT_LIMITS),
+        ("near-miss[miss=0.02]", SINGULAR),
+        ("near-miss[miss=0.2]", FREE),
+        ("speed-sweep[speed=1.3]", TOO_FAST),
+        ("speed-sweep[speed=0.7]", FREE),
+        ("back-and-forth", FREE),
+        ("unheard-of", UNKNOWN),
+    ],
+)
+def test_scenarios_are_what_their_joint_motion_asks_for(
+    scenario: str, situation: Situation
+) -> None:
+    """The situation is measured and not read off a name: a wide miss is free space."""
+    assert situation_of(scenario, 0) is situation

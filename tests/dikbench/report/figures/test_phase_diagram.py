@@ -1,0 +1,139 @@
+"""The phase diagram of near misses: its cells hold the table's values, its panels the laws."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.collections import QuadMesh
+
+from dikbench.report.drawing.style import style
+from dikbench.report.figures.phase_diagram import draw_phase_diagrams, three_digits
+from dikbench.report.selection.near_miss_grids import near_miss_grids
+from dikbench.report.selection.outcomes import OUTCOMES, outcomes
+
+MakeTrials = Callable[..., pd.DataFrame]
+
+MISSES, SPEEDS = (0.0, 0.01, 0.1), (0.2, 1.0)
+
+GRID = [
+    f"near-miss[robot=ur5,miss={miss:g},speed={speed:g}]" for miss in MISSES for speed in SPEEDS
+]
+
+
+def cells(axis: Any, mesh: int = 0) -> np.ndarray[Any, Any]:
+    """The values of a map, (speeds, misses), without the gap after miss = 0; NaN where none is."""
+    found = [artist for artist in axis.collections if isinstance(artist, QuadMesh)][mesh]
+    return np.delete(np.ma.filled(found.get_array().astype(float), np.nan), 1, axis=1)
+
+
+def test_cells_hold_what_the_table_says(
+    make_trials: MakeTrials, drawn: list[Any], target: Path
+) -> None:
+    """Each cell of the error and of the speed map is the trial's value, and is written in it."""
+    trials = make_trials(["dls", "pinv"], GRID)
+    trials["contour_error_rms_m"] = 2.0 * trials["position_error_rms_m"]
+    with style():
+        figures = draw_phase_diagrams(trials, target)
+    assert [figure.file for figure in figures] == [
+        f"phase_diagram_1_{name}.svg" for name in ("error", "peak_speed", "outcome")
+    ]
+    by_cell = trials.set_index(["formulation", "scenario"])
+    for figure, column, scale in (
+        (drawn[0], "contour_error_rms_m", 1e3),
+        (drawn[1], "velocity_peak_ratio", 1.0),
+    ):
+        panels = {axis.get_title(): axis for axis in figure.axes if axis.get_title()}
+        assert panels.keys() == {"dls", "pinv"}
+        for law, axis in panels.items():
+            wanted = np.array([scale * by_cell.loc[(law, name), column] for name in GRID])
+            wanted = wanted.reshape(len(MISSES), len(SPEEDS)).T
+            np.testing.assert_allclose(cells(axis), wanted)
+            assert [text.get_text() for text in axis.texts] == [
+                three_digits(value) for value in wanted.ravel()
+            ]
+
+
+def test_the_worst_that_applies_is_the_outcome(make_trials: MakeTrials) -> None:
+    """Failed comes before violating, that before off course, that before slow."""
+    trials = make_trials(["dls"], GRID)
+    trials["status"] = ["crashed", *["ok"] * 5]
+    trials["violating_share"] = [0.5, 0.5, 0.0, 0.0, 0.0, np.nan]
+    trials["off_course_max_rad"] = [1.0, 1.0, 1.0, 0.0, 0.0, np.nan]
+    trials["progress_min"] = [0.0, 0.0, 0.0, 0.5, 1.0, np.nan]
+    named = [OUTCOMES[code] for code in outcomes(trials)]
+    assert named == ["failed", "violating", "off course", "slow", "ok", "ok"]
+
+
+def test_a_failed_trial_is_black_and_a_missing_one_blank(
+    make_trials: MakeTrials, drawn: list[Any], target: Path
+) -> None:
+    """No number of a trial that did not end well is shown, nor of one that was never run."""
+    trials = make_trials(["dls"], GRID)
+    trials.loc[0, "status"] = "diverged"
+    with style():
+        draw_phase_diagrams(trials.drop(index=5), target)
+    axis = drawn[0].axes[0]
+    shown, failed = cells(axis), cells(axis, mesh=1)
+    assert np.isnan(shown[0, 0])
+    assert failed[0, 0] == 1.0
+    assert np.isnan(shown[1, 2])
+    assert np.isnan(failed[1, 2])
+    assert np.isfinite(shown).sum() == 4
+    assert np.isfinite(failed).sum() == 1
+    assert cells(drawn[2].axes[0])[0, 0] == OUTCOMES.index("failed")
+
+
+def test_laws_stand_in_the_order_of_how_they_do(
+    make_trials: MakeTrials, drawn: list[Any], target: Path
+) -> None:
+    """The oracle first, a law that keeps the limits before one that does not, then by the error."""
+    trials = make_trials(["violating", "far", "near", "oracle"], GRID)
+    law = trials["formulation"]
+    trials["violating_share"] = law.eq("violating") * 1.0
+    trials["off_course_max_rad"] = 0.0
+    trials["progress_min"] = 1.0
+    trials["position_error_rms_m"] = law.map(
+        {"violating": 0.0, "near": 1e-3, "far": 1e-2, "oracle": 1.0}
+    )
+    trials = trials.drop(columns="contour_error_rms_m", errors="ignore")
+    with style():
+        draw_phase_diagrams(trials, target)
+    titles = [axis.get_title() for axis in drawn[0].axes if axis.get_title()]
+    assert titles == ["oracle", "near", "far", "violating"]
+
+
+def test_a_row_of_near_misses_is_no_grid(make_trials: MakeTrials) -> None:
+    """Two misses at two speeds are a grid, three misses at one speed are none."""
+    assert len(near_miss_grids(make_trials(["dls"], GRID[:4]))) == 1
+    assert not near_miss_grids(make_trials(["dls"], GRID[::2]))
+    assert not near_miss_grids(make_trials(["dls"], ["near-miss", "reach[miss=1,speed=1]"]))
+
+
+def test_many_laws_make_several_pages(
+    make_trials: MakeTrials, drawn: list[Any], target: Path
+) -> None:
+    """21 laws are in two figures of about as many panels, and no law is left out."""
+    names = [f"law-{number}" for number in range(21)]
+    with style():
+        figures = draw_phase_diagrams(make_trials(names, GRID[:4]), target)
+    errors = [
+        shown for figure, shown in zip(figures, drawn, strict=True) if "_error" in figure.file
+    ]
+    titles = [[axis.get_title() for axis in shown.axes if axis.get_title()] for shown in errors]
+    assert [len(page) for page in titles] == [11, 10]
+    assert {title for page in titles for title in page} == set(names)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.0, "0"), (0.034, ".03"), (0.4, ".4"), (0.97, "1.0"), (2.14, "2.1"), (9.96, "10"),
+     (420.4, "420"), (23456.0, "2e4")],
+)  # fmt: skip
+def test_numbers_fit_into_a_cell(value: float, text: str) -> None:
+    """A number has at most three characters or so."""
+    assert three_digits(value) == text

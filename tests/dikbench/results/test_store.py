@@ -1,0 +1,292 @@
+"""The store of a results folder: what is committed stays, what is missing is run, nothing twice."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+import pandas as pd
+import pytest
+
+from dikbench.errors import DikbenchError
+from dikbench.results.folder import ResultsFolder
+from dikbench.results.store import Store
+from dikbench.run.runner import RunSettings, run_study, status_of, time_study
+from dikbench.study.identity import cell_id, trial_id
+from dikbench.study.study import Cells, Study, TimingSettings, expand
+from dikbench.study.trial import Trial
+
+STUDY = Study(
+    description="a few short trials",
+    cells=(Cells(("dls", "pinv[after=clip]")), Cells(("qp",), ("daqp[interface=warm]",))),
+    scenarios=("reach[duration=0.2]", "speed-sweep[laps=1,speed=2.5]"),
+    plants=("ideal",),
+    name="short",
+)
+TIMELESS = ["wall_time_s", "control_time_s", "environment", "run"]
+TRIAL = Trial("dls", "reach", "none", "ideal", "time", 0)
+
+
+def table(folder: Path) -> pd.DataFrame:
+    """Every column of the trials but the times and the worker's environment."""
+    return ResultsFolder(folder).read()[0].drop(columns=TIMELESS)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The results of the study, run once and left alone."""
+    folder = tmp_path_factory.mktemp("undisturbed")
+    run_study(STUDY, folder, RunSettings(jobs=2), "a test")
+    return folder
+
+
+def test_every_export_holds_every_trial(undisturbed: Path) -> None:
+    """CSV, Parquet and the store say the same."""
+    stored, manifest = ResultsFolder(undisturbed).read()
+    assert len(stored) == manifest["trials"] == 6
+    assert list(stored["id"]) == [p.id for p in expand(STUDY)]
+    csv = pd.read_csv(undisturbed / "trials.csv")
+    parquet = pd.read_parquet(undisturbed / "trials.parquet")
+    for name in ("position_error_rms_m", "steps", "velocity_peak_ratio"):
+        assert list(csv[name]) == list(parquet[name]) == list(stored[name])
+    assert stored["environment"].notna().all()
+
+
+def test_the_same_trial_has_the_same_id_however_it_is_spelt() -> None:
+    """Defaults that are spelt out, the order of parameters, the form of a number."""
+    same = {
+        trial_id(TRIAL),
+        trial_id(replace(TRIAL, formulation="dls[damping=0.05]")),
+        trial_id(replace(TRIAL, formulation="dls[damping=5e-2]")),
+        trial_id(replace(TRIAL, scenario="reach[robot=panda]")),
+        trial_id(replace(TRIAL, scenario="reach[dt=0.01,distance=0.1]")),
+    }
+    assert len(same) == 1
+    other = [
+        trial_id(replace(TRIAL, formulation="dls[damping=0.06]")),
+        trial_id(replace(TRIAL, formulation="pinv")),
+        trial_id(replace(TRIAL, scenario="reach[distance=0.11]")),
+        trial_id(replace(TRIAL, plant="saturating")),
+        trial_id(replace(TRIAL, reference="path")),
+        trial_id(replace(TRIAL, seed=1)),
+        trial_id(replace(TRIAL, formulation="qp", solver="daqp")),
+        trial_id(replace(TRIAL, formulation="qp", solver="daqp[interface=warm]")),
+        trial_id(replace(TRIAL, formulation="qp", solver="daqp[preset=high]")),
+    ]
+    assert len({*same, *other}) == 1 + len(other)
+    assert cell_id("dls", "none", "reach") == cell_id("dls[damping=0.05]", "none", "reach")
+
+
+def test_the_same_command_runs_only_what_is_missing(undisturbed: Path) -> None:
+    """Rows that are there keep their run; a changed study adds and deletes nothing."""
+    first = ResultsFolder(undisturbed).read()[0]
+    run_study(STUDY, undisturbed, RunSettings(jobs=1), "again")
+    pd.testing.assert_frame_equal(ResultsFolder(undisturbed).read()[0], first)
+
+
+def test_a_changed_study_adds_and_never_deletes(tmp_path: Path) -> None:
+    """What another study left stands behind what this one plans."""
+    small = msgspec.structs.replace(STUDY, cells=STUDY.cells[:1], scenarios=STUDY.scenarios[:1])
+    run_study(small, tmp_path, RunSettings(jobs=1), "first")
+    other = msgspec.structs.replace(small, cells=(Cells(("pinv",)),))
+    run_study(other, tmp_path, RunSettings(jobs=1), "second")
+    laws = list(ResultsFolder(tmp_path).read()[0]["formulation"])
+    assert laws == ["pinv", "dls", "pinv[after=clip]"]
+    assert status_of(tmp_path) == {"ok": 1}
+
+
+def test_a_changed_law_is_run_again_and_its_old_row_is_not_shown(tmp_path: Path) -> None:
+    """A law is what its source says: another source is another trial."""
+    source = (
+        "from dataclasses import dataclass\nimport numpy as np\n\n"
+        "@dataclass(frozen=True)\nclass Still:\n    def velocity(self, problem, solve):\n"
+        "        return np.full(problem.robot.nv, {})\n"
+    )
+    law = tmp_path / "still_law.py"
+    script = "import sys; from dikbench.cli import main; sys.argv = sys.argv[:1] + {!r}; main()"
+    speeds = []
+    for value in (0.0, 1e-3):
+        law.write_text(source.format(value))
+        arguments = [
+            "run", "--formulation", f"{law}:Still", "--scenario", "reach[duration=0.1]",
+            "--plant", "ideal", "--jobs", "1", "--out", str(tmp_path / "out"),
+        ]  # fmt: skip
+        subprocess.run(
+            [sys.executable, "-c", script.format(arguments)], check=True, capture_output=True
+        )
+        speeds.append(ResultsFolder(tmp_path / "out").read()[0]["joint_travel_rad"].tolist())
+    assert speeds[0] == [0.0]
+    assert len(speeds[1]) == 1
+    assert speeds[1][0] > 0
+    with sqlite3.connect(tmp_path / "out" / "results.sqlite") as database:
+        assert database.execute("SELECT COUNT(*) FROM trials").fetchone() == (2,)
+
+
+@pytest.mark.parametrize(
+    ("rerun", "again"),
+    [("", 0), ("failed", 1), ("dls", 2), ("reach", 3), ("daqp[interface=warm]", 2), ("all", 6)],
+)
+def test_rerun_chooses_what_is_run_again(tmp_path: Path, rerun: str, again: int) -> None:
+    """Failed trials, those of a law, scenario or solver, or all."""
+    run_study(STUDY, tmp_path, RunSettings(jobs=2), "first")
+    with Store(tmp_path / "results.sqlite") as store:
+        row = store.trials().iloc[0].to_dict()
+        store.record_trial({**row, "status": "timeout"}, 1, 0)
+    run_study(STUDY, tmp_path, RunSettings(jobs=2, rerun=rerun), "second")
+    runs = ResultsFolder(tmp_path).read()[0]["run"]
+    assert int((runs == 2).sum()) == again
+
+
+def test_rerun_of_what_is_not_there_is_one_line(tmp_path: Path) -> None:
+    """With the nearest match, before anything runs."""
+    with pytest.raises(DikbenchError, match=r"rerun 'dsl'.*dls"):
+        run_study(STUDY, tmp_path / "out", RunSettings(jobs=1, rerun="dsl"), "a test")
+    assert not (tmp_path / "out").exists()
+
+
+def test_status_counts_done_failed_and_missing(undisturbed: Path, tmp_path: Path) -> None:
+    """By status, and what the last study still lacks."""
+    assert status_of(undisturbed) == {"ok": 6}
+    run_study(STUDY, tmp_path, RunSettings(jobs=2), "first")
+    with sqlite3.connect(tmp_path / "results.sqlite") as database:
+        database.execute("DELETE FROM trials WHERE formulation = 'dls'")
+        database.execute("UPDATE trials SET status = 'crashed' WHERE formulation = 'qp'")
+    assert status_of(tmp_path) == {"missing": 2, "ok": 2, "crashed": 2}
+
+
+def test_two_runs_in_one_folder_exclude_each_other(tmp_path: Path) -> None:
+    """The second says so in one line and touches nothing."""
+    folder = ResultsFolder(tmp_path)
+    with folder.lock(), pytest.raises(DikbenchError, match="another run is at work in it"):
+        run_study(STUDY, tmp_path, RunSettings(jobs=1), "second")
+    assert not folder.database.exists()
+
+
+@pytest.mark.parametrize("policy", ["all", "failures", "none"])
+def test_traces_are_kept_by_policy(tmp_path: Path, policy: str) -> None:
+    """All of them, those of trials that did not end as `ok`, or none."""
+    study = msgspec.structs.replace(STUDY, cells=STUDY.cells[:1], scenarios=STUDY.scenarios[:1])
+    settings = RunSettings(jobs=1, traces=policy)  # type: ignore[arg-type]
+    run_study(study, tmp_path, settings, "a test")
+    kept = len(list((tmp_path / "traces").iterdir()))
+    assert kept == {"all": 2, "failures": 0, "none": 0}[policy]
+
+
+def test_a_store_of_another_schema_is_refused(undisturbed: Path, tmp_path: Path) -> None:
+    """And so is a file that is none, and one with other metrics."""
+    target = tmp_path / "results.sqlite"
+
+    def refused(reason: str) -> None:
+        before = target.read_bytes()
+        with pytest.raises(DikbenchError, match=reason):
+            ResultsFolder(tmp_path).read()
+        assert target.read_bytes() == before
+
+    target.write_bytes(b"something else, longer than a header" * 100)
+    refused(r"not a database|not a store")
+    target.write_bytes((undisturbed / "results.sqlite").read_bytes())
+    with sqlite3.connect(target) as database:
+        database.execute("UPDATE meta SET value = '99' WHERE key = 'schema'")
+    refused("schema version '99' is not known; this dikbench reads version 1")
+    with sqlite3.connect(target) as database:
+        database.execute("UPDATE meta SET value = '1' WHERE key = 'schema'")
+        database.execute("ALTER TABLE trials DROP COLUMN sigma_min")
+    refused("it lacks 'sigma_min'")
+
+
+@pytest.mark.parametrize("harm", ["removed", "cut", "replaced"])
+def test_a_store_that_is_harmed_under_the_run_is_noticed(
+    undisturbed: Path, tmp_path: Path, harm: str
+) -> None:
+    """SQLite itself would go on writing into a file that nobody can find any more."""
+    target = tmp_path / "results.sqlite"
+    target.write_bytes((undisturbed / "results.sqlite").read_bytes())
+    with Store(target) as store:
+        row = store.trials().iloc[0].to_dict()
+        if harm == "removed":
+            target.unlink()
+        elif harm == "cut":
+            os.truncate(target, 100)
+        else:
+            copy = tmp_path / "copy"
+            copy.write_bytes(target.read_bytes())
+            copy.replace(target)
+        with pytest.raises(DikbenchError, match=r"was removed|was replaced or cut"):
+            store.record_trial(row, 1, 0)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="nothing is read-only for root")
+def test_a_read_only_folder_is_one_line(tmp_path: Path) -> None:
+    """Before anything runs."""
+    tmp_path.chmod(0o500)
+    with pytest.raises(DikbenchError, match="cannot be written: permission denied"):
+        run_study(STUDY, tmp_path, RunSettings(jobs=1), "a test")
+
+
+def test_times_are_kept_and_taken_anew_on_request(tmp_path: Path) -> None:
+    """A run takes the times that are missing, `dikbench time` takes all."""
+    study = msgspec.structs.replace(
+        STUDY, scenarios=STUDY.scenarios[:1], timing=TimingSettings("dls", problems=10, rounds=3)
+    )
+    run_study(study, tmp_path, RunSettings(jobs=1), "first")
+
+    def stamps() -> list[int]:
+        with sqlite3.connect(tmp_path / "results.sqlite") as database:
+            return [run for (run,) in database.execute("SELECT run FROM times")]
+
+    assert stamps() == [1, 1, 1]
+    run_study(study, tmp_path, RunSettings(jobs=1), "second")
+    assert stamps() == [1, 1, 1]
+    time_study(study, tmp_path, "third")
+    assert stamps() == [3, 3, 3]
+    assert len(pd.read_csv(tmp_path / "timing.csv")) == 3
+    assert status_of(tmp_path) == {"ok": 3}
+    with pytest.raises(DikbenchError, match=r"no section \[timing\]"):
+        time_study(STUDY, tmp_path, "fourth")
+
+
+KILLED = """
+import sys
+from pathlib import Path
+from dikbench.run.runner import RunSettings, run_study
+sys.path.insert(0, {folder!r})
+from study_of_test import STUDY
+
+if __name__ == "__main__":
+    run_study(STUDY, Path({out!r}), RunSettings(jobs=2), "killed")
+"""
+
+
+def test_a_killed_run_continues_to_the_same_rows(undisturbed: Path, tmp_path: Path) -> None:
+    """Driver and workers are killed three times; the rows are those of a run left alone.
+
+    (`tests/faults/kill.py` does it as often as one likes.)
+    """
+    script = tmp_path / "killed.py"
+    (tmp_path / "study_of_test.py").write_text(
+        "import msgspec\nfrom dikbench.study.study import Study\n"
+        f"STUDY = msgspec.convert({msgspec.to_builtins(STUDY)!r}, Study)\n"
+    )
+    script.write_text(KILLED.format(folder=str(tmp_path), out=str(tmp_path / "out")))
+    for seconds in (2.5, 4.0, 5.0):
+        process = subprocess.Popen(
+            [sys.executable, str(script)],
+            start_new_session=True,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        time.sleep(seconds)
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+    run_study(STUDY, tmp_path / "out", RunSettings(jobs=2), "continued")
+    pd.testing.assert_frame_equal(table(tmp_path / "out"), table(undisturbed), check_exact=True)
+    with sqlite3.connect(tmp_path / "out" / "results.sqlite") as database:
+        assert database.execute("PRAGMA integrity_check").fetchone() == ("ok",)
+        assert database.execute("SELECT COUNT(*) FROM trials").fetchone() == (6,)

@@ -1,0 +1,279 @@
+"""A run from the plan to the report, in real worker processes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from dikbench.metrics import METRICS
+from dikbench.report.write import write_report
+from dikbench.results.folder import ResultsFolder
+from dikbench.run.runner import RunSettings, run_study, run_trials
+from dikbench.study.study import Selection, expand, load_study, select
+
+UNEQUAL = ["wall_time_s", "control_time_s", "described"]
+"""What may differ between two runs of the same trials."""
+
+HOSTILE = '''
+import os, random, signal, sys, time
+from dataclasses import dataclass
+import numpy as np
+
+forked = []
+
+@dataclass(frozen=True)
+class Hostile:
+    """Does what a law must not."""
+
+    how: str = "raise"
+
+    def velocity(self, problem, solve):
+        if self.how == "raise":
+            raise RuntimeError("first line\\nsecond line")
+        if self.how == "exit":
+            os._exit(3)
+        if self.how == "exit orderly":
+            os._exit(0)
+        if self.how == "sys.exit":
+            sys.exit(0)
+        if self.how == "memory":
+            hoard = [np.empty(2**24) for _ in range(4000)]
+        while self.how == "spin":
+            pass
+        if self.how == "sleep":
+            time.sleep(3600)
+        if self.how == "write to J":
+            problem.primary.J[0, 0] = 1.0
+        if self.how == "write to q":
+            problem.q[0] = 1.0
+        if self.how == "write to limits":
+            problem.limits.joint.velocity.upper[:] = 100.0
+        if self.how == "crash":
+            os.kill(os.getpid(), signal.SIGSEGV)
+        if self.how == "nan":
+            return np.full(problem.robot.nv, np.nan)
+        if self.how == "shape":
+            return np.zeros(problem.robot.nv + 1)
+        if self.how == "print":
+            print("x" * 10**7)
+            os.write(2, b"y" * 10**7)
+        if self.how in ("fork", "forked copy") and not forked:
+            forked.append(True)  # once: a copy that forks in every step would be a bomb
+            if os.fork() == 0 and self.how == "fork":
+                time.sleep(600)
+        if self.how == "chdir":
+            os.chdir("/")
+        if self.how == "numpy state":
+            np.seterr(all="raise")
+            np.random.seed(1)
+            random.seed(1)
+        if self.how != "diverge":
+            return np.zeros(problem.robot.nv)
+        return 1e9 * np.ones(problem.robot.nv)
+'''
+
+
+def test_every_planned_trial_has_its_row(results: Path) -> None:
+    """The table has one row per trial of the plan, no more, and the columns of the issue."""
+    trials = pd.read_csv(results / "trials.csv")
+    keys = ["formulation", "solver", "scenario", "plant", "reference", "seed"]
+    assert not trials.duplicated(keys).any()
+    oracles = 2 * 2  # scenarios and seeds: one plant, one reference mode
+    assert len(trials) == 9 * 2 * 2 * 2 * 2 + oracles
+    assert {*keys, "status", *METRICS, "law_time_median_us", "law_time_p99_us"} <= {*trials.columns}
+
+
+def test_cells_that_cannot_work_are_rows_that_say_why(results: Path) -> None:
+    """An LP through proxqp, and a path-indexed run without a path, are skipped with a reason."""
+    trials = pd.read_csv(results / "trials.csv")
+    skipped = trials[trials["status"] == "skipped"]
+    oracle = skipped["formulation"] == "oracle"
+    assert skipped[oracle]["message"].str.contains("no joint motion").all()
+    no_path = skipped[(skipped["solver"] != "proxqp") & ~oracle]
+    assert (no_path["scenario"] == "reach").all()
+    assert (no_path["reference"] == "path").all()
+    assert skipped["message"].str.len().gt(10).all()
+    assert set(trials["status"]) == {"ok", "skipped"}
+
+
+def test_times_are_of_the_law_and_not_of_a_trial(results: Path) -> None:
+    """Times belong to formulation, solver and scenario; solving is part of the law's time."""
+    trials = pd.read_csv(results / "trials.csv")
+    law = trials["formulation"] != "oracle"
+    ran = trials[law & (trials["status"] == "ok") & (trials["seed"] == 0)]
+    per_cell = ran.groupby(["formulation", "solver", "scenario"])["law_time_median_us"]
+    assert per_cell.nunique().eq(1).all()
+    inside = ran["solver_core_time_median_us"] + ran["solver_wrapper_time_median_us"]
+    assert (inside <= ran["law_time_median_us"] * 1.5).all()
+    assert (inside[ran["solver"] == "none"] == 0).all()
+    assert (inside[ran["solver"] != "none"] > 0).all()
+    assert (ran["law_time_median_us"] <= ran["law_time_p99_us"]).all()
+    assert (ran["law_time_p99_us"] <= ran["law_time_p999_us"]).all()
+    assert (ran["law_time_p999_us"] <= ran["law_time_max_us"]).all()
+    assert (ran["missed_100_hz_share"] <= ran["missed_1000_hz_share"]).all()
+    assert ran["timing_verdict"].notna().all()
+
+
+def test_tables_figures_and_manifest_are_written(results: Path) -> None:
+    """The files that the README promises are there and hold something."""
+    for name in ("tracking_error", "limit_violation", "timing"):
+        assert len(pd.read_csv(results / "tables" / f"{name}.csv")) > 5
+        assert (results / "tables" / f"{name}.md").read_text().startswith("# ")
+        assert "\\toprule" in (results / "tables" / f"{name}.tex").read_text()
+    figures = {path.name for path in (results / "figures").glob("*.svg")}
+    assert {
+        "error_and_speed_against_time.svg",
+        "off_course_against_slow_down.svg",
+        "time_per_law_and_solver.svg",
+    } <= figures
+    manifest = json.loads((results / "manifest.json").read_text())
+    assert manifest["study"]["name"] == "smoke"
+    assert {"daqp", "osqp", "clarabel"} <= set(manifest["solvers"])
+    report = (results / "report.md").read_text()
+    for name in figures:
+        assert name in report
+    assert "proxqp cannot take a linear program" in report
+
+
+def test_seeds_differ_and_a_path_indexed_run_waits(results: Path) -> None:
+    """Another seed is another run, and a scaling law tracks better when the reference waits."""
+    trials = pd.read_csv(results / "trials.csv")
+    lp = trials[
+        (trials["formulation"] == "lp-alpha")
+        & (trials["solver"] == "daqp")
+        & (trials["plant"] == "ideal")
+        & trials["scenario"].str.startswith("near-miss")
+    ].set_index(["reference", "seed"])
+    assert lp.loc[("time", 0), "progress_min"] != lp.loc[("time", 1), "progress_min"]
+    errors = lp["position_error_max_m"]
+    assert errors["path", 0] < 0.2 * errors["time", 0]
+    assert lp["steps"]["path", 0] > lp["steps"]["time", 0]
+
+
+def test_a_run_is_the_same_with_one_worker_and_with_two(tmp_path: Path) -> None:
+    """Every column but the times is bit-equal whatever the number of workers."""
+    selection = Selection(scenarios=("near-miss[miss=0.02]",), plants=("ideal",))
+    planned = expand(select(load_study("smoke"), selection, named=True))
+    tables = []
+    folders = [ResultsFolder(tmp_path / str(jobs)) for jobs in (1, 2)]
+    for jobs, folder in enumerate(folders, start=1):
+        folder.traces.mkdir(parents=True)
+        rows = {p.id: row for p, row in run_trials(planned, folder, RunSettings(jobs))}
+        tables.append(pd.DataFrame([rows[p.id] for p in planned]).drop(columns=UNEQUAL))
+    pd.testing.assert_frame_equal(*tables, check_exact=True)
+    one, two = folders
+    names = sorted(path.name for path in one.traces.iterdir())
+    assert names == sorted(path.name for path in two.traces.iterdir())
+    assert len(names) == sum(not p.skip for p in planned)
+    for name in names:
+        assert (one.traces / name).read_bytes() == (two.traces / name).read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("how", "status", "message"),
+    [
+        ("raise", "formulation-error", "step 0: RuntimeError: first line"),
+        ("exit", "crashed", "exit code"),
+        ("exit orderly", "crashed", "exit code"),
+        ("sys.exit", "crashed", "asked the process to end: SystemExit"),
+        ("memory", "out-of-memory", "step 0"),
+        ("spin", "timeout", "not finished after 8 s"),
+        ("sleep", "timeout", "not finished after 8 s"),
+        ("write to J", "formulation-error", "step 0: ValueError"),
+        ("write to q", "formulation-error", "step 0: ValueError"),
+        ("write to limits", "formulation-error", "step 0: ValueError"),
+        ("crash", "crashed", "exit code"),
+        ("nan", "not-finite", "step 0"),
+        ("shape", "wrong-shape", "step 0: expected (7,), got (8,)"),
+        ("diverge", "diverged", "step 0"),
+    ],
+)
+def test_a_hostile_law_ends_as_a_row_and_the_run_goes_on(
+    tmp_path: Path,
+    how: str,
+    status: str,
+    message: str,
+    write: Callable[[Path], str],
+) -> None:
+    """Whatever a law does, its trial is a row with its status and the others are untouched."""
+    law = write(tmp_path)
+    selection = Selection(
+        formulations=(f"{law}[how={how}]", "dls"), scenarios=("reach",), plants=("ideal",)
+    )
+    planned = expand(select(load_study("smoke"), selection, named=False))
+    folder = ResultsFolder(tmp_path / "out")
+    folder.traces.mkdir(parents=True)
+    settings = RunSettings(jobs=1, trial_timeout=8.0, trial_memory=2000)
+    rows = {p.trial.formulation: row for p, row in run_trials(planned, folder, settings)}
+    bad, good = rows[planned[0].trial.formulation], rows["dls"]
+    assert bad["status"] == status
+    assert message in bad["message"]
+    assert good["status"] == "ok"
+    assert good["position_error_final_m"] < 0.01
+
+
+@pytest.fixture
+def write() -> Callable[[Path], str]:
+    """A function that writes the hostile law and returns its selector's name."""
+
+    def to(folder: Path) -> str:
+        path = folder / "hostile.py"
+        path.write_text(HOSTILE)
+        return f"{path}:Hostile"
+
+    return to
+
+
+def test_a_report_of_nothing_but_skipped_cells_is_made(tmp_path: Path) -> None:
+    """A run in which no cell could work still ends with tables and a report that says why."""
+    selection = Selection(
+        formulations=("lp-alpha",), solvers=("proxqp",), scenarios=("reach",), plants=("ideal",)
+    )
+    run_study(
+        select(load_study("smoke"), selection, named=False),
+        tmp_path / "out",
+        RunSettings(1),
+        "a test",
+    )
+    write_report(tmp_path / "out")
+    assert "1 cell skipped" in (tmp_path / "out" / "report.md").read_text()
+
+
+@pytest.mark.parametrize("how", ["print", "fork", "forked copy", "chdir", "numpy state"])
+def test_a_harmless_oddity_of_a_law_changes_nothing(
+    tmp_path: Path, how: str, write: Callable[[Path], str]
+) -> None:
+    """It ends as `ok`, and the rows beside it are those of a run without it."""
+    law = write(tmp_path)
+    tables = []
+    for number, formulations in enumerate(((f"{law}[how={how}]", "dls"), ("dls",))):
+        selection = Selection(
+            formulations=formulations, scenarios=("reach[duration=0.2]",), plants=("ideal",)
+        )
+        planned = expand(select(load_study("smoke"), selection, named=False))
+        folder = ResultsFolder(tmp_path / str(number))
+        folder.traces.mkdir(parents=True)
+        found = run_trials(planned, folder, RunSettings(jobs=1, trial_timeout=60.0))
+        tables.append({p.trial.formulation: row for p, row in found})
+    assert tables[0][f"{law}[how={how}]"]["status"] == "ok"
+    beside, alone = (pd.DataFrame([table["dls"]]).drop(columns=UNEQUAL) for table in tables)
+    pd.testing.assert_frame_equal(beside, alone, check_exact=True)
+
+
+def test_a_law_that_hangs_is_not_timed_and_the_others_are(
+    tmp_path: Path, write: Callable[[Path], str]
+) -> None:
+    """The run ends with its report: the timing pass has no limit for a single call."""
+    law = write(tmp_path)
+    selection = Selection(
+        formulations=(f"{law}[how=spin]", "dls"), scenarios=("reach[duration=0.2]",)
+    )
+    study = select(load_study("smoke"), selection, named=False)
+    run_study(study, tmp_path / "out", RunSettings(jobs=2, trial_timeout=4.0), "a test")
+    write_report(tmp_path / "out")
+    assert set(pd.read_csv(tmp_path / "out" / "timing.csv")["formulation"]) == {"dls"}
+    assert "2 trials timeout: not finished after 4 s" in (tmp_path / "out/report.md").read_text()

@@ -1,0 +1,349 @@
+"""Laws that go wrong: how they end a trial, the status of a step, and the fallback."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from dikbench.arrays import Array
+from dikbench.errors import Infeasible, SolverFailed
+from dikbench.problem import DikProblem, Formulation, Solve
+from dikbench.problem.tasks import PoseTask
+from dikbench.programs.answer import Answer
+from dikbench.programs.quadratic_program import Program, QuadraticProgram
+from dikbench.robots.catalogue import load_robot
+from dikbench.scenario import Scenario
+from dikbench.scenario.certificate import Certificate
+from dikbench.scenario.plant import Drive, Plant, ideal
+from dikbench.scenario.reference.reference import joint_path, target_at_rest
+from dikbench.simulation.closed_loop import FAR_CHECK, Run, simulate
+from dikbench.simulation.control_step import fallback
+from dikbench.simulation.status import STEP_CODE, Status
+from dikbench.solvers.catalogue.back_ends import parse_solver
+from dikbench.solvers.checked_solve import CheckedSolve, make_solve
+
+RATE = np.array([0.5, -0.4, 0.6])
+
+
+def _scenario(
+    *, dt: float = 0.01, duration: float = 0.3, rate: Array = RATE, **limits: Any
+) -> Scenario:
+    """A planar arm that is to follow the pose of q0 + t rate, from its own velocity on."""
+    robot = load_robot("planar3r").with_limits(**limits)
+    q0 = np.array([0.4, 0.8, 0.7])
+    return Scenario(
+        robot=robot,
+        q0=q0,
+        v0=rate.copy(),
+        reference=joint_path(robot, lambda tau: q0 + tau * rate, lambda tau: rate, duration),
+        tracking=PoseTask(gain=2.0),
+        dt=dt,
+        duration=duration,
+        certificate=Certificate(()),
+    )
+
+
+class _Law:
+    """A law made of a function of the problem; it keeps the problems that it saw."""
+
+    def __init__(self, velocity: Callable[[DikProblem], Any]) -> None:
+        self.answer = velocity
+        self.seen: list[DikProblem] = []
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Any:
+        self.seen.append(problem)
+        return self.answer(problem)
+
+
+def _exact(problem: DikProblem) -> Array:
+    """The velocity that does the task."""
+    v: Array = np.linalg.solve(problem.primary.J, problem.primary.V)
+    return v
+
+
+def _run(
+    law: Formulation | Callable[[DikProblem], Any],
+    scenario: Scenario | None = None,
+    *,
+    drive: Drive = ideal,
+    mode: Any = "time",
+    solve: CheckedSolve | None = None,
+) -> Run:
+    formulation = law if isinstance(law, Formulation) else _Law(law)
+    chosen = make_solve(None, None) if solve is None else solve
+    return simulate(scenario or _scenario(), formulation, chosen, Plant(drive), mode)
+
+
+# --- how laws end a trial
+
+
+def _at_step(k: int, wrong: Callable[[], Any]) -> Callable[[DikProblem], Any]:
+    """A law that does the task until step k, and then something wrong."""
+    steps = iter(range(10**6))
+    return lambda problem: wrong() if next(steps) == k else _exact(problem)
+
+
+def _raise(error: BaseException) -> Any:
+    raise error
+
+
+@pytest.mark.parametrize(
+    ("wrong", "status", "message"),
+    [
+        (lambda: _raise(ValueError("no\nsecond line")), "formulation-error", "ValueError: no$"),
+        (lambda: _raise(KeyError("gain")), "formulation-error", "KeyError: 'gain'$"),
+        (lambda: _raise(RuntimeError()), "formulation-error", "RuntimeError"),
+        (lambda: np.linalg.inv(np.zeros((3, 3))), "formulation-error", "LinAlgError: Singular"),
+        (lambda: _raise(MemoryError()), "out-of-memory", ""),
+        (lambda: np.zeros(2), "wrong-shape", r"expected \(3,\), got \(2,\)$"),
+        (lambda: np.zeros((3, 1)), "wrong-shape", r"expected \(3,\), got \(3, 1\)$"),
+        (lambda: np.float64(1.0), "wrong-shape", r"expected \(3,\), got \(\)$"),
+        (lambda: [0.0, 0.0, 0.0], "wrong-shape", r"expected \(3,\), got list$"),
+        (lambda: None, "wrong-shape", r"expected \(3,\), got NoneType$"),
+        (lambda: np.array([None] * 3), "wrong-shape", r"object"),
+        (lambda: np.array(["1"] * 3), "wrong-shape", r"<U1"),
+        (lambda: np.array([1j, 0, 0]), "wrong-shape", r"complex128"),
+        (lambda: np.array([0, np.nan, 0]), "not-finite", r"nan"),
+        (lambda: np.array([0, 0, -np.inf]), "not-finite", r"-inf"),
+        (lambda: np.array([0, 2e6, 0]), "diverged", r"commanded speed above 1e\+06 rad/s$"),
+    ],
+)
+@pytest.mark.parametrize("k", [0, 7])
+@pytest.mark.parametrize("mode", ["time", "path"])
+def test_a_law_that_goes_wrong_ends_its_trial(
+    wrong: Callable[[], Any], status: str, message: str, k: int, mode: str
+) -> None:
+    """With a status, the step and the reason on one line, and the steps before it in the trace."""
+    run = _run(_at_step(k, wrong), mode=mode)
+    assert run.status.value == status
+    assert re.search(rf"^step {k}: .*{message}", run.message)
+    assert "\n" not in run.message
+    assert run.trace.steps == k
+    assert len(run.trace.q) == len(run.trace.tau) == k + 1
+    assert np.isfinite(run.trace.q).all()
+    assert np.all(run.trace.status == STEP_CODE[Status.OK])
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.int64])
+def test_a_law_may_answer_in_other_numbers(kind: type) -> None:
+    """Single precision and integers are numbers: the run goes on."""
+    run = _run(lambda problem: np.array([0, 1, -1], dtype=kind))
+    assert run.status is Status.OK
+    assert run.trace.q[-1] == pytest.approx([0.4, 0.8 + 0.3, 0.7 - 0.3])
+
+
+def test_a_motion_without_bounds_is_ended() -> None:
+    """A target 200 m away is no task error that a law can be judged by."""
+    scenario = _scenario()
+    far = pin.SE3(np.eye(3), np.array([200.0, 0.0, 0.0]))
+    run = _run(_exact, replace(scenario, reference=target_at_rest(far, 0.3)))
+    assert run.status is Status.DIVERGED
+    assert run.message == "step 0: task error above 100 m, rad"
+    assert run.trace.steps == 0
+
+
+@pytest.mark.parametrize("jump", [1, FAR_CHECK - 1, FAR_CHECK, FAR_CHECK + 1])
+def test_a_target_that_runs_away_ends_a_run_at_the_next_look(jump: int) -> None:
+    """The task error is looked at in one step out of so many, and then ends the run."""
+    scenario = _scenario()
+    far = pin.SE3(np.eye(3), np.array([200.0, 0.0, 0.0]))
+    away = target_at_rest(far, 0.3)
+    near = scenario.reference.placement
+
+    def placement(tau: float) -> Any:
+        return (away.placement if tau > (jump - 0.5) * scenario.dt else near)(tau)
+
+    reference = replace(scenario.reference, placement=placement)
+    run = _run(lambda problem: np.zeros(3), replace(scenario, reference=reference))
+    step = FAR_CHECK if jump <= FAR_CHECK else 2 * FAR_CHECK
+    if step < 30:
+        assert run.status is Status.DIVERGED
+        assert run.message == f"step {step}: task error above 100 m, rad"
+        assert run.trace.steps == step
+    else:
+        assert run.status is Status.OK
+
+
+@pytest.mark.parametrize(
+    ("error", "status"),
+    [
+        (Infeasible("no point"), Status.INFEASIBLE),
+        (SolverFailed("gave up"), Status.SOLVER_FAILED),
+    ],
+)
+def test_a_law_without_an_answer_gets_the_fallback_and_goes_on(
+    error: Exception, status: Status
+) -> None:
+    """One step with that status, in which the robot stops; the trial is ok."""
+    run = _run(_at_step(7, lambda: _raise(error)))
+    assert (run.status, run.message) == (Status.OK, "")
+    assert run.trace.steps == 30
+    assert np.flatnonzero(run.trace.status == STEP_CODE[status]).tolist() == [7]
+    assert run.trace.share(status) == pytest.approx(1 / 30)
+    assert np.all(run.trace.commanded[7] == 0)
+    assert run.trace.q[8] == pytest.approx(run.trace.q[7])
+
+
+def test_a_law_that_solves_without_saying_so_is_told() -> None:
+    """The message of the trial says what to declare."""
+
+    class Silent:
+        def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+            return solve(QuadraticProgram(np.eye(3), np.zeros(3)))
+
+    run = _run(Silent())
+    assert run.status is Status.FORMULATION_ERROR
+    assert "set program = 'qp' or 'lp'" in run.message
+
+
+@dataclass(frozen=True)
+class _Projection:
+    """The velocity nearest to the exact one inside the limits, as a quadratic program."""
+
+    program: ClassVar[Program] = "qp"
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        box = problem.box()
+        return solve(QuadraticProgram(np.eye(3), -_exact(problem), lb=box.lower, ub=box.upper))
+
+
+class _Liar:
+    """A back end that claims every answer, and is 0.5 rad/s beside the right one at step 5."""
+
+    def __init__(self) -> None:
+        self.calls = 0
+
+    def __call__(self, program: QuadraticProgram, site: int) -> Answer:
+        assert program.lb is not None
+        assert program.ub is not None
+        self.calls += 1
+        x = np.clip(-program.q, program.lb, program.ub)
+        z_box = -program.q - x
+        return Answer(x + (0.5 if self.calls == 6 else 0.0), True, z_box=z_box)
+
+
+def test_a_lying_solver_is_caught_and_its_answer_applied() -> None:
+    """`not-verified` at that step alone; its residual is in the trace, in rad/s."""
+    run = _run(_Projection(), solve=CheckedSolve(_Liar()))
+    assert run.status is Status.OK
+    assert np.flatnonzero(run.trace.status).tolist() == [5]
+    assert run.trace.status[5] == STEP_CODE[Status.NOT_VERIFIED]
+    assert run.trace.dual[5] == pytest.approx(0.5)
+    assert np.delete(run.trace.dual, 5).max() < 1e-12
+    assert run.trace.claimed.tolist() == [1] * 30
+    assert np.flatnonzero(run.trace.verified != 1).tolist() == [5]
+    assert run.trace.verified[5] == 0
+
+
+@dataclass(frozen=True)
+class _Impossible:
+    """x = 0 and x = 1, always."""
+
+    program: ClassVar[Program] = "qp"
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        A = np.array([[1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+        return solve(QuadraticProgram(np.eye(3), np.zeros(3), A=A, b=np.array([0.0, 1.0])))
+
+
+@pytest.mark.parametrize("solver", ["daqp", "piqp", "proxqp"])
+def test_an_infeasible_program_is_a_status_of_its_steps(solver: str) -> None:
+    """Said by the solver: infeasible. Claimed solved by it: not verified. Nothing else."""
+    run = _run(_Impossible(), solve=make_solve(parse_solver(solver), "qp"))
+    assert run.status is Status.OK
+    caught = run.trace.share(Status.INFEASIBLE) + run.trace.share(Status.NOT_VERIFIED)
+    assert caught == pytest.approx(1.0)
+
+
+def test_steps_that_go_nowhere_are_stuck() -> None:
+    """Less than 1 % of the wanted motion; a hundredth and a bit is not."""
+    for share, stuck in ((0.0099, 1.0), (0.0101, 0.0), (-0.5, 1.0)):
+        run = _run(lambda problem, share=share: share * _exact(problem))
+        assert run.trace.share(Status.STUCK) == stuck
+
+
+# --- the fallback
+
+
+def _problem(v_prev: Array | None, **limits: Any) -> DikProblem:
+    robot = load_robot("planar3r").with_limits(**limits)
+    return DikProblem(robot, robot.q0, v_prev, 0.01, [], robot.limits.at(robot.q0))
+
+
+@settings(deadline=None)
+@given(
+    v_prev=arrays(float, 3, elements=st.floats(-2, 2)),
+    down=arrays(float, 3, elements=st.floats(0.5, 30)),
+    up=arrays(float, 3, elements=st.floats(0.5, 30)),
+)
+def test_the_fallback_slows_down_uniformly(v_prev: Array, down: Array, up: Array) -> None:
+    """To c v_prev with the smallest c in [0, 1] that the acceleration limits allow, in the box."""
+    problem = _problem(v_prev, position=None, acceleration=(-down, up))
+    v = fallback(problem)
+    size = float(v_prev @ v_prev)
+    c = float(v @ v_prev) / size if size > 0 else 0.0
+    assert v == pytest.approx(c * v_prev, abs=1e-9)
+    assert -1e-12 <= c <= 1
+
+    def allowed(factor: float) -> bool:
+        change = (factor - 1) * v_prev / problem.dt
+        return bool(np.all((change >= -down - 1e-6) & (change <= up + 1e-6)))
+
+    assert allowed(c)
+    assert c <= 1e-6 or not allowed(c - 1e-3)
+    box = problem.box()
+    assert np.all((box.lower <= v) & (v <= box.upper))
+
+
+@pytest.mark.parametrize("v_prev", [None, np.array([1.0, -2.0, 0.5])])
+def test_without_acceleration_limits_the_fallback_stops(v_prev: Array | None) -> None:
+    """At once: nothing forbids it."""
+    assert np.array_equal(fallback(_problem(v_prev)), np.zeros(3))
+
+
+def test_the_fallback_stays_in_the_box() -> None:
+    """Too fast towards a limit: clipped; outside it: the way back."""
+    v_prev, first = np.array([2.0, 0.0, 0.0]), load_robot("planar3r").q0[0]
+    near = _problem(v_prev, position=(-2.0, [first + 0.005, 2.0, 2.0]), acceleration=10.0)
+    # 0.005 rad in three steps of 10 ms, the later ones 0.1 and 0.2 rad/s slower: 0.8/3 rad/s.
+    assert fallback(near) == pytest.approx([0.8 / 3, 0.0, 0.0])
+    outside = _problem(None, position=(-2.0, [first - 0.1, 2.0, 2.0]))
+    assert fallback(outside) == pytest.approx([-0.2, 0.0, 0.0])  # a tenth of 2 rad/s
+
+
+@settings(deadline=None)
+@given(
+    v_prev=arrays(float, 3, elements=st.floats(-2, 2)),
+    G=arrays(float, (4, 3), elements=st.floats(-1, 1)),
+    room=arrays(float, 4, elements=st.floats(0, 0.5)),
+)
+def test_the_fallback_keeps_rows_that_going_on_would_keep(
+    v_prev: Array, G: Array, room: Array
+) -> None:
+    """Where v_prev satisfies G v <= h, so does the fallback, with the smallest c in [0, 1]."""
+    problem = _problem(v_prev, position=None, velocity=None)
+    problem.G, problem.h = G, G @ v_prev + room
+    v = fallback(problem)
+    assert np.all(G @ v <= problem.h + 1e-9)
+    assert np.abs(v).max() < 1e-6 or np.any(G @ (0.99 * v) > problem.h)
+
+
+def test_the_fallback_brings_a_robot_to_rest() -> None:
+    """A law that never answers: the slowest joint's limit sets the pace, the path is straight."""
+    scenario = _scenario(acceleration=[1.0, 30.0, 30.0])
+    run = _run(lambda problem: _raise(Infeasible("never")), replace(scenario, duration=0.6))
+    speeds = run.trace.applied[:, 0]
+    assert speeds == pytest.approx(np.maximum(0.5 - 0.01 * np.arange(1, 61), 0.0), abs=1e-12)
+    assert run.trace.applied == pytest.approx(np.outer(speeds / 0.5, RATE), abs=1e-12)
+    assert run.trace.share(Status.INFEASIBLE) == 1.0

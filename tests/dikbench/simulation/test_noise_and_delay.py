@@ -1,0 +1,166 @@
+"""Plants that measure with noise and act late: what the law sees, when its commands arrive."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dikbench.arrays import Array
+from dikbench.errors import DikbenchError
+from dikbench.plugins.registry import make_plant
+from dikbench.problem import DikProblem, Solve
+from dikbench.problem.tasks import PoseTask
+from dikbench.robots.catalogue import load_robot
+from dikbench.scenario import Scenario
+from dikbench.scenario.certificate import Certificate
+from dikbench.scenario.plant import Plant, ideal, saturating
+from dikbench.scenario.reference.reference import joint_path
+from dikbench.simulation.closed_loop import Run, simulate
+from dikbench.solvers.checked_solve import make_solve
+from dikbench.study.identity import trial_id
+from dikbench.study.trial import Trial
+
+RATE = np.array([0.5, -0.4, 0.6])
+
+
+def _scenario(robot_name: str = "planar3r") -> Scenario:
+    robot = load_robot(robot_name)
+    q0, rate = np.array([0.4, 0.8, 0.7]), RATE
+    return Scenario(
+        robot=robot,
+        q0=q0,
+        v0=rate.copy(),
+        reference=joint_path(robot, lambda tau: q0 + tau * rate, lambda tau: rate, 2.0),
+        tracking=PoseTask(gain=5.0),
+        dt=0.01,
+        duration=2.0,
+        certificate=Certificate(()),
+    )
+
+
+class _Law:
+    """The exact law; it keeps what it saw."""
+
+    def __init__(self) -> None:
+        self.seen: list[Array] = []
+        self.before: list[Array] = []
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        self.seen.append(problem.q)
+        assert problem.v_prev is not None
+        self.before.append(problem.v_prev)
+        v: Array = np.linalg.solve(problem.primary.J, problem.primary.V)
+        return v
+
+
+def _run(law: Any, plant: Plant, seed: int = 0) -> Run:
+    return simulate(_scenario(), law, make_solve(None, None), plant, "time", seed)
+
+
+def test_a_late_command_is_applied_so_many_steps_later() -> None:
+    """Until the first one arrives the robot keeps the velocity that it had at the start."""
+    law = _Law()
+    trace = _run(law, Plant(delay=3)).trace
+    assert np.array_equal(trace.applied[3:], trace.commanded[:-3])
+    assert np.array_equal(trace.applied[:3], np.tile(RATE, (3, 1)))
+    # The law is told what was applied, not what it commanded.
+    assert np.array_equal(np.array(law.before)[1:], trace.applied[:-1])
+
+
+def test_without_delay_commands_are_applied_at_once() -> None:
+    """The plain plant."""
+    trace = _run(_Law(), Plant()).trace
+    assert np.array_equal(trace.applied, trace.commanded)
+
+
+def test_a_delay_makes_a_tight_loop_unstable() -> None:
+    """A gain of 60/s at 10 ms, far from its limit of 2/dt, oscillates when 5 steps late."""
+
+    def final_error(delay: int) -> float:
+        scenario = _scenario()
+        fast = Scenario(
+            **{
+                **{f: getattr(scenario, f) for f in scenario.__dataclass_fields__},
+                "tracking": PoseTask(gain=60.0),
+                "q0": scenario.q0 + 0.01,
+            }
+        )
+        run = simulate(fast, _Law(), make_solve(None, None), Plant(delay=delay))
+        end = run.trace.q[-1] - (scenario.q0 + 2.0 * RATE)
+        return float(np.abs(end).max())
+
+    assert final_error(0) < 1e-6
+    assert final_error(5) > 0.1
+
+
+def test_noise_is_on_what_is_seen_not_on_the_robot() -> None:
+    """The law sees q plus white noise of the given size; what is recorded is the true motion."""
+    law = _Law()
+    trace = _run(law, Plant(noise=1e-3)).trace
+    noise = np.array(law.seen) - trace.q[:-1]
+    assert noise.std() == pytest.approx(1e-3, rel=0.1)
+    assert abs(noise.mean()) < 2e-4
+    neighbours = (noise[1:] * noise[:-1]).mean() / noise.var()
+    assert abs(neighbours) < 0.1  # white
+    steps = np.diff(trace.q, axis=0)
+    assert steps == pytest.approx(trace.applied * 0.01)
+
+
+def test_the_trials_seed_is_the_noises() -> None:
+    """The same seed sees the same noise, another one another."""
+    a, b, c = (_run(_Law(), Plant(noise=1e-3), seed).trace.q for seed in (1, 1, 2))
+    assert np.array_equal(a, b)
+    assert np.abs(a - c).max() > 1e-5
+
+
+def test_the_saturating_drive_clips_by_the_true_configuration() -> None:
+    """Noise on the measurement does not let the robot through its limit."""
+    scenario = _scenario()
+    upper = scenario.q0 + 0.05
+    robot = scenario.robot.with_limits(position=(scenario.q0 - 1.0, upper))
+    tight = Scenario(
+        **{**{f: getattr(scenario, f) for f in scenario.__dataclass_fields__}, "robot": robot}
+    )
+    run = simulate(tight, _Law(), make_solve(None, None), Plant(saturating, noise=1e-2))
+    assert np.all(run.trace.q <= upper + 1e-12)
+    assert np.abs(run.trace.q.max(axis=0) - upper).min() < 1e-12
+
+
+def test_selectors_of_plants() -> None:
+    """A name, or a name with noise and delay."""
+    assert make_plant("ideal") == Plant(ideal)
+    assert make_plant("saturating[noise=1e-3,delay=2]") == Plant(saturating, 1e-3, 2)
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("idle", ["unknown plant 'idle'", "'ideal'", "saturating"]),
+        ("ideal[noise=-1]", ["noise=-1.0 must be finite and at least 0"]),
+        ("ideal[noise=inf]", ["noise=inf must be finite"]),
+        ("ideal[delay=1001]", ["delay=1001 must be 0 to 1000 steps"]),
+        ("ideal[delay=0.5]", ["delay='0.5' is not valid"]),
+        ("ideal[lag=1]", ["unknown parameter of plant ideal 'lag'", "delay, noise"]),
+        ("ideal[drive=x]", ["unknown parameter of plant ideal 'drive'"]),
+    ],
+)
+def test_wrong_plants_are_errors_of_one_line(text: str, parts: list[str]) -> None:
+    """What, where, what would be valid."""
+    with pytest.raises(DikbenchError) as caught:
+        make_plant(text)
+    assert "\n" not in str(caught.value)
+    for part in parts:
+        assert part in str(caught.value)
+
+
+def test_a_plant_that_means_the_same_is_the_same_trial() -> None:
+    """A default that is spelt out changes no id; noise and delay do."""
+
+    def name(plant: str) -> str:
+        return trial_id(Trial("dls", "reach", "none", plant, "time", 0))
+
+    assert name("ideal") == name("ideal[noise=0]") == name("ideal[delay=0]")
+    others = ("ideal", "ideal[noise=1e-4]", "ideal[delay=1]", "saturating")
+    assert len({name(plant) for plant in others}) == 4

@@ -1,0 +1,158 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from dikbench.cli.listing import description
+from dikbench.errors import DikbenchError
+from dikbench.solvers.catalogue.back_ends import parse_solver
+from dikbench.study.study import Selection, Study, expand, load_study, select, shipped_studies
+
+MINIMAL = """
+description = "a study"
+scenarios = ["reach"]
+[[cells]]
+formulations = ["dls"]
+"""
+
+WriteStudy = Callable[[str], str]
+
+
+@pytest.fixture
+def write_study(tmp_path: Path) -> WriteStudy:
+    """A function that writes a study file and returns its path."""
+
+    def write(text: str) -> str:
+        path = tmp_path / "mine.toml"
+        path.write_text(text)
+        return str(path)
+
+    return write
+
+
+def solvers_of(study: Study) -> dict[str, list[str]]:
+    """The solvers with which each formulation runs."""
+    found: dict[str, list[str]] = {}
+    for planned in expand(study):
+        solvers = found.setdefault(planned.trial.formulation, [])
+        if planned.trial.solver not in solvers:
+            solvers.append(planned.trial.solver)
+    return found
+
+
+@pytest.mark.parametrize("name", shipped_studies())
+def test_every_shipped_study_expands_to_trials_with_distinct_ids(name: str) -> None:
+    """Each shipped study is valid, and no two of its trials are the same."""
+    planned = expand(load_study(name))
+    assert planned
+    assert len({p.id for p in planned}) == len(planned)
+
+
+def test_quick_covers_laws_families_and_solvers() -> None:
+    """The default study has five laws, the oracle, four families and six QP solvers."""
+    trials = [planned.trial for planned in expand(load_study("quick"))]
+    laws = {trial.formulation.partition("[")[0] for trial in trials}
+    families = {trial.scenario.partition("[")[0] for trial in trials}
+    assert laws == {"oracle", "pinv", "dls", "nullspace", "qp", "lp-alpha", "lp-alpha-cvxpy"}
+    assert families == {"reach", "near-miss", "joint-limit-crossing", "speed-sweep"}
+    solvers = [parse_solver(trial.solver) for trial in trials if trial.formulation == "qp"]
+    assert len({solver.name for solver in solvers}) == 6
+    assert {solver.interface for solver in solvers} == {"cold", "warm"}
+    assert {trial.plant for trial in trials} == {"ideal", "saturating"}
+
+
+def test_a_law_without_solver_runs_once_whatever_solvers_are_named() -> None:
+    """Solvers multiply only the laws that need one."""
+    chosen = Selection(formulations=("dls", "qp"), solvers=("osqp", "daqp"))
+    assert solvers_of(select(load_study("quick"), chosen, named=False)) == {
+        "dls": ["none"],
+        "qp": ["osqp", "daqp"],
+    }
+
+
+def test_a_formulation_alone_gets_the_default_solver() -> None:
+    """Without a study and a solver, a law runs with the default solver of its kind of program."""
+    chosen = Selection(formulations=("qp[damping=0.1]", "lp-alpha-cvxpy"))
+    assert solvers_of(select(load_study("quick"), chosen, named=False)) == {
+        "qp[damping=0.1]": ["daqp"],
+        "lp-alpha-cvxpy": ["clarabel"],
+    }
+
+
+def test_a_formulation_of_a_named_study_keeps_its_solvers() -> None:
+    """Naming a study and a formulation of it keeps the study's solvers for that formulation."""
+    smoke = load_study("smoke")
+    chosen = Selection(formulations=("qp[damping=0.1]",))
+    assert solvers_of(select(smoke, chosen, named=True)) == {"qp[damping=0.1]": ["daqp", "osqp"]}
+
+
+def test_a_pair_that_cannot_work_is_planned_with_its_reason() -> None:
+    """A linear program through proxqp stays in the plan as a skipped cell that says why."""
+    chosen = Selection(formulations=("lp-alpha",), solvers=("proxqp",), scenarios=("reach",))
+    planned = expand(select(load_study("quick"), chosen, named=False))
+    assert planned
+    assert all("linear program" in p.skip for p in planned)
+
+
+def test_selectors_stand_in_the_trial_as_they_were_given() -> None:
+    """Defaults are neither added to nor removed; what means the same is run once."""
+    chosen = Selection(
+        formulations=("dls[damping=0.05]", "dls", "dls[damping=0.1]"),
+        scenarios=("reach[robot=panda]", "reach"),
+    )
+    trials = [p.trial for p in expand(select(load_study("quick"), chosen, named=False))]
+    assert {t.formulation for t in trials} == {"dls[damping=0.05]", "dls[damping=0.1]"}
+    assert {t.scenario for t in trials} == {"reach[robot=panda]"}
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (("scenarios", "scenarioss"), ("scenarioss", "valid keys", "scenarios")),
+        (('["reach"]', '"reach"'), ("array", "scenarios")),
+        (('["reach"]', "[]"), ("scenarios",)),
+        (('["reach"]', "[1]"), ("str", "scenarios")),
+        (("formulations", "formulation"), ("formulation", "valid keys", "solvers")),
+        (('"dls"', '"dlss"'), ("dlss", "did you mean 'dls'")),
+        (('"dls"', '"dls[damp=1]"'), ("damp", "valid: damping")),
+        (('"dls"', '"qp"'), ("qp", "needs a solver")),
+        (('"reach"', '"reech"'), ("reech", "did you mean 'reach'")),
+        (('"reach"', '"reach[distance=7]"'), ("distance=7", "between")),
+        (('"reach"', '"reach[robot=ur55]"'), ("ur55", "did you mean 'ur5'")),
+        (("description", "seeds = [-1]\ndescription"), ("seeds",)),
+        (("description", 'plants = ["perfect"]\ndescription'), ("perfect", "plant")),
+        (("description", "timing = 3\ndescription"), ("timing",)),
+        (("description", "description = 3 #"), ("str", "description")),
+        (("description", ""), ("TOML",)),
+    ],
+)
+def test_a_malformed_study_is_one_line_that_says_what_and_where(
+    write_study: WriteStudy, change: tuple[str, str], expected: tuple[str, ...]
+) -> None:
+    """Unknown keys, wrong types and unknown names give one line with what would be valid."""
+    path = write_study(MINIMAL.replace(*change, 1))
+    with pytest.raises(DikbenchError) as caught:
+        expand(load_study(path))
+    assert "\n" not in str(caught.value)
+    for part in expected:
+        assert part in str(caught.value)
+
+
+def test_a_study_that_is_not_there_names_the_shipped_ones() -> None:
+    """An unknown study lists the studies that exist."""
+    with pytest.raises(DikbenchError, match=r"quik.*did you mean 'quick'.*smoke"):
+        load_study("quik")
+
+
+def test_a_timing_reference_that_needs_a_solver_is_an_error(write_study: WriteStudy) -> None:
+    """The law whose problems are replayed must be one that needs no solver."""
+    path = write_study(MINIMAL + '[timing]\nreference = "qp"\n')
+    with pytest.raises(DikbenchError, match="needs a solver"):
+        expand(load_study(path))
+
+
+def test_a_study_as_it_is_shown_is_a_study(write_study: WriteStudy) -> None:
+    """What `dikbench show quick` prints can be saved and run."""
+    assert load_study(write_study(description("quick"))).scenarios == load_study("quick").scenarios
