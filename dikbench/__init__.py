@@ -24,7 +24,7 @@ if TYPE_CHECKING:
         Task,
     )
     from dikbench.programs.quadratic_program import QuadraticProgram
-    from dikbench.results.frames import Results, load_results
+    from dikbench.results.reading import Results, load_results
     from dikbench.robots.catalogue import load_robot
     from dikbench.robots.collision.obstacles import BoxObstacle, CapsuleObstacle, SphereObstacle
     from dikbench.robots.robot import Robot
@@ -50,7 +50,7 @@ _HOME = {
     "PositionTask": "problem.tasks",
     "PostureTask": "problem.tasks",
     "QuadraticProgram": "programs.quadratic_program",
-    "Results": "results.frames",
+    "Results": "results.reading",
     "Robot": "robots.robot",
     "Scenario": "scenario",
     "Solve": "problem",
@@ -59,7 +59,7 @@ _HOME = {
     "Status": "simulation.status",
     "Task": "problem.tasks",
     "TorqueConstraint": "problem.constraints",
-    "load_results": "results.frames",
+    "load_results": "results.reading",
     "load_robot": "robots.catalogue",
     "solve_dik": "simulation.one_step",
 }

@@ -35,7 +35,7 @@ def main() -> None:
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(package_name="dikbench")
 def commands() -> None:
-    """Compare laws of differential inverse kinematics in closed loop, on real robot models.
+    """Compare formulations of differential inverse kinematics in closed loop, on real robot models.
 
     A selector is a name, with parameters where wanted: 'dls[damping=0.1]',
     'near-miss[robot=ur5,miss=0.02]', 'osqp[eps_abs=1e-6]'.
@@ -49,7 +49,7 @@ STUDY_OPTIONS = (
         "formulations",
         multiple=True,
         metavar="SELECTOR",
-        help="A law, path/to/file.py:Class, or oracle; 'dls[damping=0.01|0.1]' is two.",
+        help="A formulation, path/to/file.py:Class, or oracle; 'dls[damping=0.01|0.1]' is two.",
     ),
     click.option(
         "--scenario",
@@ -63,7 +63,7 @@ STUDY_OPTIONS = (
         "solvers",
         multiple=True,
         metavar="SELECTOR",
-        help="A solver, for laws that need one; repeat for more.",
+        help="A solver, for formulations that need one; repeat for more.",
     ),
     click.option(
         "--seed",
@@ -122,7 +122,7 @@ def _selected(study: str | None, axes: dict[str, Any]) -> Any:
     "--rerun",
     default="",
     metavar="WHICH",
-    help="Run finished trials again: failed, all, or a law, scenario or solver.",
+    help="Run finished trials again: failed, all, or a formulation, scenario or solver.",
 )
 @click.option(
     "--trial-timeout",
@@ -158,7 +158,7 @@ def run(
     traces: Any,
     **axes: Any,
 ) -> None:
-    """Run what is missing of a study: the matrix of laws x scenarios x solvers.
+    """Run what is missing of a study: the matrix of formulations x scenarios x solvers.
 
     STUDY is a shipped study (see `dikbench list studies`) or a TOML file; default: quick. Each
     option replaces an axis of the study. The same command continues a run that was stopped.
@@ -225,7 +225,7 @@ def report(folder: Path) -> None:
 )
 @one_line_errors
 def recompute(folder: Path, jobs: int | None) -> None:
-    """Compute all metrics of a results folder anew from its traces, without running a law.
+    """Compute all metrics of a results folder anew from its traces, without running a formulation.
 
     For metrics that are new, or were mended, since the run. Trials whose trace was not kept stay as
     they are; the tables and figures are made anew by the next `dikbench run`.
@@ -280,7 +280,7 @@ def list_(subject: str | None) -> None:
 )
 @one_line_errors
 def show(name: str, figure: Path | None) -> None:
-    """Print one law, scenario, solver, robot, metric or study in full.
+    """Print one formulation, scenario, solver, robot, metric or study in full.
 
     A scenario's selector prints its certificate as well.
     """
@@ -288,7 +288,7 @@ def show(name: str, figure: Path | None) -> None:
 
     text = description(name)
     if figure is not None:
-        from dikbench.report.figures.scenario import draw_scenario
+        from dikbench.report.figures.scenario_drawing import draw_scenario
 
         draw_scenario(name, figure)
         text += f"\n\n{figure}"

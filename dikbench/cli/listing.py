@@ -38,10 +38,13 @@ def _bracketed(source: str) -> str:
 
 
 def _formulations() -> list[tuple[str, str, str]]:
-    laws = plugins("formulation").values()
+    formulations = plugins("formulation").values()
     summary = "Not a law: the joint motion from which a scenario's path was built, scored like one"
     return [
-        *((law.name, law.summary.rstrip("."), law.source) for law in laws),
+        *(
+            (formulation.name, formulation.summary.rstrip("."), formulation.source)
+            for formulation in formulations
+        ),
         (ORACLE, summary, ""),
     ]
 

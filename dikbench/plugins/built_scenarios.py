@@ -7,10 +7,11 @@ from functools import lru_cache
 from dikbench.errors import DikbenchError
 from dikbench.plugins.registry import make_scenario
 from dikbench.scenario.scenario import Scenario
+from dikbench.selector import Selector
 
 
 @lru_cache(maxsize=1024)
-def built(selector: str, seed: int) -> Scenario | str:
+def built(selector: str | Selector, seed: int) -> Scenario | str:
     """A scenario, or why it cannot be built here: results may come from another installation."""
     try:
         return make_scenario(selector, seed)

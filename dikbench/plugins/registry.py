@@ -133,7 +133,7 @@ def _checked(kind: Kind, name: object, build: object, file: str) -> Plugin:
     return Plugin(name, build, own_file)
 
 
-def make_formulation(text: str) -> Formulation:
+def make_formulation(text: str | Selector) -> Formulation:
     """Build a law from `name[parameter=value,...]` or `path/to/file.py:Class[...]`.
 
     Raises:
@@ -156,7 +156,7 @@ def formulation_plugin(name: str) -> Plugin:
     return known[name]
 
 
-def make_scenario(text: str, seed: int = 0) -> Scenario:
+def make_scenario(text: str | Selector, seed: int = 0) -> Scenario:
     """Build the scenario of a selector and a seed; its certificate is asserted.
 
     Raises:
@@ -166,7 +166,7 @@ def make_scenario(text: str, seed: int = 0) -> Scenario:
     selector = parse_selector(text)
     plugin = scenario_plugin(selector.name)
     if "seed" in selector.parameters:
-        raise DikbenchError(f"scenario {text!r}: the seed is not a parameter; use --seed")
+        raise DikbenchError(f"scenario {str(text)!r}: the seed is not a parameter; use --seed")
     extra: dict[str, Any] = {"seed": seed} if "seed" in plugin.parameters else {}
     if seed and not extra:
         raise DikbenchError(f"scenario family {selector.name!r} takes no seed; valid: 0")
@@ -176,11 +176,11 @@ def make_scenario(text: str, seed: int = 0) -> Scenario:
             f"{plugin.file}: scenario {selector.name!r} returned {type(scenario).__name__}, "
             "not a Scenario"
         )
-    scenario.certificate.check(text)
+    scenario.certificate.check(str(text))
     return scenario
 
 
-def make_plant(text: str) -> Plant:
+def make_plant(text: str | Selector) -> Plant:
     """Build a plant from `ideal[noise=...,delay=...]` or `saturating[...]`.
 
     Raises:
@@ -194,7 +194,7 @@ def make_plant(text: str) -> Plant:
     return plant
 
 
-def scenario_parameters(text: str) -> Mapping[str, Any]:
+def scenario_parameters(text: str | Selector) -> Mapping[str, Any]:
     """The parameters of a scenario's selector with their values, defaults among them, but the seed.
 
     Raises:
@@ -203,7 +203,7 @@ def scenario_parameters(text: str) -> Mapping[str, Any]:
     selector = parse_selector(text)
     plugin = scenario_plugin(selector.name)
     if "seed" in selector.parameters:
-        raise DikbenchError(f"scenario {text!r}: the seed is not a parameter; use --seed")
+        raise DikbenchError(f"scenario {str(text)!r}: the seed is not a parameter; use --seed")
     defaults = {name: parameter.default for name, parameter in plugin.parameters.items()}
     given = _values("scenario", plugin, selector)
     return {name: value for name, value in {**defaults, **given}.items() if name != "seed"}

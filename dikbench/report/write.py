@@ -16,7 +16,8 @@ from dikbench.report.tables.kinds import TIMING
 from dikbench.report.tables.markdown import markdown_rows
 from dikbench.report.tables.return_codes import TITLE as RETURN_CODES
 from dikbench.results.folder import ResultsFolder
-from dikbench.results.lenient_reading import read_results
+from dikbench.results.reading import read_results
+from dikbench.results.selected import with_selected
 from dikbench.statistics.stability import STABLE
 
 
@@ -29,7 +30,7 @@ def write_report(path: Path) -> str:
     Raises:
         DikbenchError: if the folder holds no results, or cannot be written.
     """
-    results = read_results(path)
+    results = read_results(path, lenient=True)
     try:
         contents = gather(results, draw_figures(results.folder, results.trials, results.manifest))
         codes = _write_tables(path, contents)
@@ -57,11 +58,11 @@ def write_times(path: Path) -> str:
     """
     with ResultsFolder(path).open_store() as store:
         times = store.times()
-    table = make_table(TIMING, times.assign(status="ok"))
+    table = make_table(TIMING, with_selected(times).assign(status="ok"))
     write_table(table, path / "tables")
-    unstable = times[times["timing_verdict"] != STABLE]
+    unstable = times[times["timing_stability"] != STABLE]
     told = [
-        f"- {row.formulation} with {row.solver} on {row.scenario}: {row.timing_verdict}."
+        f"- {row.formulation} with {row.solver} on {row.scenario}: {row.timing_stability}."
         for row in unstable.itertuples()
     ]
     return "\n".join([to_text(table), *told])

@@ -1,4 +1,4 @@
-"""The columns of a results table that are neither metrics nor parameters."""
+"""The columns of a table of results that are neither metrics nor parameters of selectors."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-KEYS: Final = (
-    "formulation",
-    "solver",
-    "scenario",
-    "plant",
-    "reference",
-    "seed",
-    "status",
-    "message",
+TRIAL: Final = ["formulation", "solver", "scenario", "plant", "reference", "seed"]
+"""What says which trial a row is of, whatever the versions."""
+
+KEYS: Final = (*TRIAL, "status", "message")
+TIMED: Final = ["formulation", "solver", "scenario"]
+"""What says which times a row is of."""
+
+SELECTORS: Final = MappingProxyType(
+    {"formulation": "name", "solver": "name", "scenario": "family", "plant": "name"}
 )
-CELL: Final = ["formulation", "solver", "scenario"]
+"""Columns that hold selectors, and what the part before the brackets is called."""
 
 RATES: Final = (100, 200, 500, 1000)
 """Control rates [Hz] whose deadlines are counted."""
@@ -24,13 +24,19 @@ RATES: Final = (100, 200, 500, 1000)
 TIMES: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
     {
         "kinematics_time_median_us": ("REAL", "median time of kinematics and tasks [us]"),
-        "law_time_median_us": ("REAL", "median time of one call of the law with its solver [us]"),
-        "law_own_time_median_us": ("REAL", "median of it outside the solver [us]"),
+        "formulation_time_median_us": (
+            "REAL",
+            "median time of one call of the formulation with its solver [us]",
+        ),
+        "formulation_own_time_median_us": ("REAL", "median of it outside the solver [us]"),
         "solver_core_time_median_us": ("REAL", "median of it in the library's solving call [us]"),
-        "solver_wrapper_time_median_us": ("REAL", "median of it between law and library [us]"),
-        "law_time_p99_us": ("REAL", "99 % quantile of the call [us]"),
-        "law_time_p999_us": ("REAL", "99.9 % quantile of the call [us]"),
-        "law_time_max_us": ("REAL", "longest call [us]"),
+        "solver_wrapper_time_median_us": (
+            "REAL",
+            "median of it between formulation and library [us]",
+        ),
+        "formulation_time_p99_us": ("REAL", "99 % quantile of the call [us]"),
+        "formulation_time_p999_us": ("REAL", "99.9 % quantile of the call [us]"),
+        "formulation_time_max_us": ("REAL", "longest call [us]"),
         **{
             f"missed_{rate}_hz_share": (
                 "REAL",
@@ -39,7 +45,40 @@ TIMES: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
             for rate in RATES
         },
         "timing_samples": ("INTEGER", "number of calls timed"),
-        "timing_verdict": ("TEXT", "stable, or why the times cannot be trusted"),
+        "timing_stability": ("TEXT", "stable, or why the times cannot be trusted"),
     }
 )
 """Columns of the timing pass: type in the store, and what they say."""
+
+RENAMED: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        **{
+            name.replace("formulation", "formulation", 1): name
+            for name in TIMES
+            if name.startswith("formulation_")
+        },
+        "timing_verdict": "timing_stability",
+    }
+)
+"""Columns of older results, and what they are called today."""
+
+DESCRIBED: Final = MappingProxyType(
+    {
+        "id": ("", "hash of everything that the trial is made of"),
+        "formulation": ("", "selector of the formulation"),
+        "solver": ("", "selector of its solver; none for a formulation that needs none"),
+        "scenario": ("", "selector of the scenario"),
+        "plant": ("", "selector of the plant"),
+        "reference": ("", "what moved the reference on: time or path"),
+        "seed": ("", "seed of the scenario"),
+        "status": ("", "how the trial ended"),
+        "message": ("", "why, where it did not end well"),
+        "steps": ("", "number of control steps"),
+        "wall_time_s": ("s", "time of the trial in its worker"),
+        "control_time_s": ("s", "of it in kinematics, formulation and solver"),
+        "environment": ("", "name of the worker's environment in the store"),
+        "run": ("", "number of the run that the row is of"),
+        **{name: ("us" if name.endswith("_us") else "", text) for name, (_, text) in TIMES.items()},
+    }
+)
+"""Unit and definition of the columns of trials that are no metrics."""

@@ -11,13 +11,13 @@ from typing import Any, Final
 import pandas as pd
 
 from dikbench.errors import DikbenchError
-from dikbench.results.columns import KEYS
+from dikbench.results.columns import KEYS, RENAMED
 
 TRIALS: Final = "trials.csv"
 PARQUET: Final = "trials.parquet"
 MANIFEST: Final = "manifest.json"
 
-TEXT: Final = ("id", *(key for key in KEYS if key != "seed"), "environment", "timing_verdict")
+TEXT: Final = ("id", *(key for key in KEYS if key != "seed"), "environment", "timing_stability")
 NEEDED: Final = tuple(name for name in KEYS if name != "message")
 """Columns without which a row says nothing."""
 
@@ -38,8 +38,8 @@ def read_trials(folder: Path, notes: list[str]) -> pd.DataFrame:
         DikbenchError: if there are none, or not what a run writes.
     """
     if not (folder / TRIALS).is_file() and (folder / PARQUET).is_file():
-        return _parquet(folder / PARQUET)
-    trials = _rows(folder / TRIALS, notes)
+        return _parquet(folder / PARQUET).rename(columns=RENAMED)
+    trials = _rows(folder / TRIALS, notes).rename(columns=RENAMED)
     for name in trials.columns:
         if name not in TEXT:
             trials[name] = _numbers(trials[name])

@@ -6,9 +6,7 @@ import json
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
-import pandas as pd
 from filelock import FileLock, Timeout
 
 from dikbench.errors import DikbenchError
@@ -16,11 +14,8 @@ from dikbench.results.exports import (
     MANIFEST,
     PARQUET,
     TRIALS,
-    are_exported,
-    read_manifest,
-    read_trials,
 )
-from dikbench.results.store import OtherVersion, Store
+from dikbench.results.store import Store
 
 
 class ResultsFolder:
@@ -113,26 +108,6 @@ class ResultsFolder:
             raise DikbenchError(
                 f"output folder {self.path}: {reason}; the store keeps what was committed"
             ) from None
-
-    def read(self) -> tuple[pd.DataFrame, dict[str, Any]]:
-        """The trials of the last run and the manifest: from the store, else from its exports.
-
-        Raises:
-            DikbenchError: if the folder holds no results.
-        """
-        exported = are_exported(self.path)
-        if not exported or self.database.is_file():
-            try:
-                with self.open_store() as store:
-                    return store.trials(), store.manifest()
-            except OtherVersion:
-                if not exported:
-                    raise
-        notes: list[str] = []
-        trials = read_trials(self.path, notes)
-        if notes:
-            raise DikbenchError(f"{notes[0]} `dikbench report` reads what is left.")
-        return trials, read_manifest(self.path)
 
 
 def _replace(path: Path, write: Callable[[Path], object]) -> None:

@@ -15,12 +15,13 @@ import pandas as pd
 
 from dikbench.errors import DikbenchError
 from dikbench.metrics import METRICS
-from dikbench.results.columns import CELL, KEYS, TIMES
-from dikbench.study.study import PlannedTrial
+from dikbench.results.columns import KEYS, RENAMED, TIMED, TIMES, TRIAL
+from dikbench.study.plan import PlannedTrial
 from dikbench.study.trial import Trial
 
-SCHEMA: Final = 1
-"""Version of the tables below; another one is not read."""
+SCHEMA: Final = 2
+"""Version of the tables below. A store of version 1, whose times have other names, is renamed when
+it is opened; another one is not read."""
 
 NUMBERS: Final = (*METRICS, "wall_time_s", "control_time_s")
 
@@ -49,7 +50,7 @@ CREATE TABLE times (
 """
 """A trial's `position` is its place in the plan of the last run; without one it is not part of it
 and shown after it. It is `superseded`, kept but not shown, where the plan has a trial with the same
-selectors whose law or scenario has another source."""
+selectors whose formulation or scenario has another source."""
 
 
 class OtherVersion(DikbenchError):
@@ -125,11 +126,11 @@ class Store:
             "UPDATE trials SET position = ?, superseded = 0 WHERE id = ?",
             [(number, trial.id) for number, trial in enumerate(planned)],
         )
-        known = {tuple(row[1:]): row[0] for row in self._database.execute(
-            "SELECT id, formulation, solver, scenario, plant, reference, seed FROM trials "
-            "WHERE position IS NULL AND NOT superseded"
-        )}  # fmt: skip
-        now = (_selectors(p.trial) for p in planned)
+        rows = self._database.execute(
+            f"SELECT id, {', '.join(TRIAL)} FROM trials WHERE position IS NULL AND NOT superseded"
+        )
+        known = {tuple(row[1:]): row[0] for row in rows}
+        now = (tuple(p.trial.row.values()) for p in planned)
         old = [(known[selectors],) for selectors in now if selectors in known]
         self._database.executemany("UPDATE trials SET superseded = 1 WHERE id = ?", old)
 
@@ -139,11 +140,11 @@ class Store:
 
     def stored_trials(self) -> list[StoredTrial]:
         """Every trial that is shown."""
-        rows = self._rows(
-            "SELECT id, steps, formulation, scenario, solver, plant, reference, seed FROM trials "
-            "WHERE NOT superseded"
-        )
-        return [StoredTrial(name, Trial(*cell), steps) for name, steps, *cell in rows]
+        rows = self._rows(f"SELECT id, steps, {', '.join(TRIAL)} FROM trials WHERE NOT superseded")
+        return [
+            StoredTrial(name, Trial.of(**dict(zip(TRIAL, cell, strict=True))), steps)
+            for name, steps, *cell in rows
+        ]
 
     def timed(self) -> set[str]:
         """The ids of the cells that have times."""
@@ -179,24 +180,24 @@ class Store:
 
     def record_times(self, row: Mapping[str, Any], run: int) -> None:
         """Commit the times of a cell."""
-        columns = ("id", *CELL, *TIMES, "environment")
+        columns = ("id", *TIMED, *TIMES, "environment")
         self._insert("times", {**{name: row.get(name) for name in columns}, "run": run})
 
     def trials(self) -> pd.DataFrame:
-        """Every trial, those of the last run's plan first and in its order; times beside them."""
+        """Every trial, those of the last run's plan first and in its order; with their times."""
         order = ", ".join(["id", *KEYS, "steps", *NUMBERS, "environment", "run"])
         trials = self._frame(
             f"SELECT {order} FROM trials WHERE NOT superseded "
-            f"ORDER BY position IS NULL, position, {', '.join(KEYS[:6])}",
+            f"ORDER BY position IS NULL, position, {', '.join(TRIAL)}",
             NUMBERS,
         )
-        return trials.merge(self.times(), on=CELL, how="left")
+        return trials.merge(self.times(), on=TIMED, how="left")
 
     def times(self) -> pd.DataFrame:
         """The times of every cell."""
         numbers = [name for name, (kind, _) in TIMES.items() if kind == "REAL"]
-        columns = ", ".join([*CELL, *TIMES])
-        return self._frame(f"SELECT {columns} FROM times ORDER BY {', '.join(CELL)}", numbers)
+        columns = ", ".join([*TIMED, *TIMES])
+        return self._frame(f"SELECT {columns} FROM times ORDER BY {', '.join(TIMED)}", numbers)
 
     def manifest(self) -> dict[str, Any]:
         """The description of the last run.
@@ -285,7 +286,9 @@ class Store:
             columns = [row[1] for row in self._database.execute("PRAGMA table_info(trials)")]
         except sqlite3.DatabaseError as error:
             raise DikbenchError(f"store {self.path}: not a store of dikbench: {error}") from None
-        if found.get("schema") != str(SCHEMA):
+        if found.get("schema") == "1":
+            self._rename_times()
+        elif found.get("schema") != str(SCHEMA):
             raise OtherVersion(
                 f"store {self.path}: schema version {found.get('schema')!r} is not known; this "
                 f"dikbench reads version {SCHEMA}"
@@ -299,6 +302,13 @@ class Store:
         for name in missing:
             self._database.execute(f"ALTER TABLE trials ADD COLUMN {name} REAL")
 
+    def _rename_times(self) -> None:
+        """Give the columns of times that version 1 wrote today's names."""
+        with self._guarded(), self._transaction():
+            for old, new in RENAMED.items():
+                self._database.execute(f"ALTER TABLE times RENAME COLUMN {old} TO {new}")
+            self._database.execute("UPDATE meta SET value = ? WHERE key = 'schema'", [str(SCHEMA)])
+
     def _check_untouched(self) -> None:
         """A file that is removed or cut under an open database takes rows without a word."""
         try:
@@ -308,14 +318,3 @@ class Store:
         if now.st_ino != self._file.st_ino or now.st_size < self._file.st_size:
             raise DikbenchError(f"store {self.path}: it was replaced or cut during the run")
         self._file = now
-
-
-def _selectors(trial: Trial) -> tuple[str | int, ...]:
-    return (
-        trial.formulation,
-        trial.solver,
-        trial.scenario,
-        trial.plant,
-        trial.reference,
-        trial.seed,
-    )

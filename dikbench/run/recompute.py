@@ -33,7 +33,7 @@ class Recomputed:
     Attributes:
         done: number of trials whose metrics were computed anew.
         without_trace: number of those that have moved, but whose trace was not kept.
-        changed: number of those whose law or scenario is another one today.
+        changed: number of those whose formulation or scenario is another one today.
         failed: reasons of those whose trace cannot be used, by the name of the trial.
     """
 
@@ -46,7 +46,7 @@ class Recomputed:
         """One line."""
         kept = {
             "without a trace": self.without_trace,
-            "whose law or scenario has changed since": self.changed,
+            "whose formulation or scenario has changed since": self.changed,
             "whose trace cannot be used": len(self.failed),
         }
         left = [f"{number} {why}" for why, number in kept.items() if number]
@@ -57,7 +57,7 @@ class Recomputed:
 def recompute_results(out: Path, jobs: int, command: str) -> Recomputed:
     """Compute every metric of a results folder again from its traces, and export anew.
 
-    A trial is only recomputed if its law and scenario are still those that it was run with.
+    A trial is only recomputed if its formulation and scenario are still those that it was run with.
 
     Args:
         out: results folder.
@@ -96,7 +96,7 @@ def _is_the_same(stored: StoredTrial) -> bool:
     """Whether a trial would be this one if it were run today."""
     try:
         return trial_id(stored.trial) == stored.id
-    except DikbenchError:  # the law's file is gone, the scenario has another parameter
+    except DikbenchError:  # the formulation's file is gone, the scenario has another parameter
         return False
 
 
@@ -106,7 +106,7 @@ def _recompute(
     """Recompute trials in worker processes and commit each as it comes; the reasons of failures."""
     failed: dict[str, str] = {}
     # Scenario by scenario: a worker builds each once.
-    order = sorted(todo, key=lambda stored: (stored.trial.scenario, stored.trial.seed))
+    order = sorted(todo, key=lambda stored: (str(stored.trial.scenario), stored.trial.seed))
     with (
         workers(jobs, (__name__,)) as pool,
         ProgressDisplay(len(todo), "recomputed trials") as display,
@@ -120,7 +120,7 @@ def _recompute(
             try:
                 metrics = future.result()
             except Exception as error:  # a plug-in's scenario may do anything
-                failed[_name(stored)] = " ".join(str(error).split())
+                failed[f"{stored.trial} ({stored.id})"] = " ".join(str(error).split())
             else:
                 store.record_metrics(stored.id, metrics)
             display.advance()
@@ -153,10 +153,3 @@ def _check_fits(trace: Trace, scenario: Scenario, steps: int, file: Path) -> Non
     )
     if found != expected:
         raise DikbenchError(f"trace {file}: not of this trial: {found} instead of {expected}")
-
-
-def _name(stored: StoredTrial) -> str:
-    """A trial by its selectors and its id."""
-    trial = stored.trial
-    how = (trial.formulation, trial.solver, trial.scenario, trial.plant, trial.reference)
-    return f"{', '.join(how)}, seed {trial.seed} ({stored.id})"

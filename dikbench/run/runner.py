@@ -15,19 +15,19 @@ import msgspec
 from pebble import ProcessExpired
 
 from dikbench.errors import DikbenchError, unknown
-from dikbench.results.columns import CELL
 from dikbench.results.folder import ResultsFolder
 from dikbench.results.store import Store
 from dikbench.run.pool import end_group, workers
 from dikbench.run.progress_display import ProgressDisplay
 from dikbench.run.provenance import environment, git_commit, manifest
 from dikbench.run.timing import Cell, time_scenario
-from dikbench.run.trial_row import CannotStore, Row, TracePolicy, row_without_run, work
+from dikbench.run.trial_row import CannotStore, TracePolicy, TrialRow, row_without_run, work
 from dikbench.scenario.oracle import ORACLE
-from dikbench.selector import parse_selector
+from dikbench.selector import Selector, parse_selector
 from dikbench.simulation.status import Status
-from dikbench.study.identity import cell_id
-from dikbench.study.study import PlannedTrial, Study, expand
+from dikbench.study.identity import timing_id
+from dikbench.study.plan import PlannedTrial, expand
+from dikbench.study.study import Study
 from dikbench.study.trial import Trial
 
 TIMING_TIMEOUT: Final = 900.0
@@ -36,7 +36,7 @@ TIMING_TIMEOUT: Final = 900.0
 FATAL: Final = frozenset(
     status.value for status in (Status.TIMEOUT, Status.CRASHED, Status.OUT_OF_MEMORY)
 )
-"""Ends of a trial after which its law is not timed."""
+"""Ends of a trial after which its formulation is not timed."""
 
 AHEAD: Final = 8
 """Trials per worker that are handed over ahead: no worker waits, and memory does not grow."""
@@ -142,7 +142,7 @@ def _check_rerun(rerun: str, planned: Sequence[PlannedTrial]) -> None:
 def _names(trial: Trial) -> set[str]:
     """What a trial can be called by: selectors, and names without parameters."""
     selectors = (trial.formulation, trial.scenario, trial.solver)
-    return {*selectors, *(parse_selector(selector).name for selector in selectors)}
+    return {*map(str, selectors), *(selector.name for selector in selectors)}
 
 
 def _again(planned: PlannedTrial, status: str, rerun: str) -> bool:
@@ -178,7 +178,7 @@ def run_trials(
     settings: RunSettings,
     commit: str | None = None,
     command: str = "",
-) -> Iterator[tuple[PlannedTrial, Row]]:
+) -> Iterator[tuple[PlannedTrial, TrialRow]]:
     """Run trials in worker processes; the rows come as they finish.
 
     Raises:
@@ -187,7 +187,7 @@ def run_trials(
     skipped = [p for p in todo if p.skip]
     yield from ((p, row_without_run(p.trial, Status.SKIPPED, p.skip)) for p in skipped)
     # Scenario by scenario: a worker builds each once.
-    first: dict[tuple[str, int], int] = {}
+    first: dict[tuple[Selector, int], int] = {}
     for p in todo:
         first.setdefault((p.trial.scenario, p.trial.seed), len(first))
     waiting = iter(
@@ -213,7 +213,7 @@ def run_trials(
             end_group(process)
 
 
-def _row(future: Future[Any], trial: Trial, timeout: float) -> Row:
+def _row(future: Future[Any], trial: Trial, timeout: float) -> TrialRow:
     """The row of a finished trial, whatever became of it."""
     try:
         row, described = future.result()
@@ -244,7 +244,7 @@ def _time(
             cell
             for p in planned
             if not p.skip
-            and p.trial.formulation != ORACLE
+            and p.trial.formulation.name != ORACLE
             and (cell := (p.trial.formulation, p.trial.solver)) not in fatal
         )
     )
@@ -253,9 +253,9 @@ def _time(
     known: set[str] = set() if again else store.timed()
     scenarios = [
         scenario
-        for scenario in study.scenarios
-        if (not timing.scenarios or scenario in timing.scenarios)
-        and any(cell_id(*cell, scenario) not in known for cell in cells)
+        for scenario in map(parse_selector, study.scenarios)
+        if (not timing.scenarios or str(scenario) in timing.scenarios)
+        and any(timing_id(*cell, scenario) not in known for cell in cells)
     ]
     if not scenarios:
         return
@@ -271,14 +271,16 @@ def _time(
             for scenario in scenarios
         }
         for scenario, future in futures.items():
-            rows: list[Row] = []
+            rows: list[TrialRow] = []
             try:
                 rows = future.result()
-            except Exception as error:  # a law can take the process with it: no times, no harm
+            except (
+                Exception
+            ) as error:  # a formulation can take the process with it: no times, no harm
                 reason = f"{type(error).__name__}: {error}".partition("\n")[0]
                 print(f"no times for {scenario}: {reason}", file=sys.stderr)
-            for row in rows:
-                store.record_times({"id": cell_id(*(row[key] for key in CELL)), **row}, run)
+            for cell, row in zip(cells, rows, strict=False):
+                store.record_times({"id": timing_id(*cell, scenario), **row}, run)
             display.advance()
 
 

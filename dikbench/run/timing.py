@@ -19,9 +19,10 @@ from dikbench.problem.constraints import linearize_all
 from dikbench.problem.problem import DikProblem, Formulation, Solve
 from dikbench.results.columns import RATES
 from dikbench.robots.kinematics import Kinematics
-from dikbench.run.trial_row import Row, scenario_of, solve_of
+from dikbench.run.trial_row import TrialRow, scenario_of, solve_of
 from dikbench.scenario.plant import Plant
 from dikbench.scenario.scenario import Scenario
+from dikbench.selector import Selector
 from dikbench.simulation.closed_loop import simulate
 from dikbench.simulation.control_step import TrialEnded, control_step
 from dikbench.solvers.checked_solve import CheckedSolve, make_solve
@@ -31,7 +32,7 @@ LEAD_IN: Final = 5
 """Problems that are replayed before each timed segment: they bring back what another cell drove out
 of the caches, and a warm start to where the segment begins."""
 
-Cell = tuple[str, str]
+Cell = tuple[Selector, Selector]
 """The selectors of a law and its solver."""
 
 PARTS: Final = ("law", "own", "core", "wrapper")
@@ -60,8 +61,8 @@ def record_problems(scenario: Scenario, law: Formulation, count: int) -> list[Di
 
 
 def time_scenario(
-    selector: str, seed: int, cells: Sequence[Cell], reference: str, problems: int, rounds: int
-) -> list[Row]:
+    selector: Selector, seed: int, cells: Sequence[Cell], reference: str, problems: int, rounds: int
+) -> list[TrialRow]:
     """Time every cell on one scenario's problems.
 
     In every round each cell solves the whole segment, in a new random order of the cells, so that
@@ -96,9 +97,9 @@ def time_scenario(
                     samples[index, :, max(turn, 0)] = _replay(*laws[index], segment)
     return [
         {
-            "formulation": law,
-            "solver": solver,
-            "scenario": selector,
+            "formulation": str(law),
+            "solver": str(solver),
+            "scenario": str(selector),
             **_summary(samples[index], kinematics),
         }
         for index, (law, solver) in enumerate(cells)
@@ -157,7 +158,7 @@ def _time_kinematics(scenario: Scenario, segment: Sequence[DikProblem]) -> Array
     return np.array(found, dtype=float)
 
 
-def _summary(samples: Array, kinematics: Array) -> Row:
+def _summary(samples: Array, kinematics: Array) -> TrialRow:
     """What is reported of one cell: samples (parts, rounds, problems), kinematics, all [ns]."""
     law = samples[PARTS.index("law")]
     timed = law[~np.isnan(law)] / 1e3
@@ -169,16 +170,16 @@ def _summary(samples: Array, kinematics: Array) -> Row:
     shared = float(np.median(kinematics)) / 1e3
     return {
         "kinematics_time_median_us": shared,
-        "law_time_median_us": float(np.median(timed)),
-        "law_own_time_median_us": own,
+        "formulation_time_median_us": float(np.median(timed)),
+        "formulation_own_time_median_us": own,
         "solver_core_time_median_us": core,
         "solver_wrapper_time_median_us": wrapper,
-        "law_time_p99_us": float(np.quantile(timed, 0.99)),
-        "law_time_p999_us": float(np.quantile(timed, 0.999)),
-        "law_time_max_us": float(timed.max()),
+        "formulation_time_p99_us": float(np.quantile(timed, 0.99)),
+        "formulation_time_p999_us": float(np.quantile(timed, 0.999)),
+        "formulation_time_max_us": float(timed.max()),
         **{
             f"missed_{rate}_hz_share": float(np.mean(timed + shared > 1e6 / rate)) for rate in RATES
         },
         "timing_samples": len(timed),
-        "timing_verdict": verdict(law),
+        "timing_stability": verdict(law),
     }

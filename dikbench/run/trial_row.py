@@ -18,6 +18,7 @@ from dikbench.run.provenance import environment
 from dikbench.run.worker_process import calm_down
 from dikbench.scenario.oracle import ORACLE
 from dikbench.scenario.scenario import Scenario
+from dikbench.selector import Selector
 from dikbench.simulation.closed_loop import ReferenceMode, simulate
 from dikbench.simulation.oracle_law import replay_of
 from dikbench.simulation.status import Status
@@ -25,7 +26,7 @@ from dikbench.solvers.catalogue.back_ends import parse_solver
 from dikbench.solvers.checked_solve import CheckedSolve, make_solve
 from dikbench.study.trial import NO_SOLVER, Trial
 
-Row = dict[str, Any]
+TrialRow = dict[str, Any]
 """One trial as it stands in the table: column -> value."""
 
 TracePolicy = Literal["all", "failures", "none"]
@@ -36,43 +37,31 @@ class CannotStore(DikbenchError):
 
 
 @lru_cache(maxsize=32)
-def scenario_of(selector: str, seed: int) -> Scenario:
+def scenario_of(selector: Selector, seed: int) -> Scenario:
     """The scenario of a trial, built once per process."""
     return make_scenario(selector, seed)
 
 
-def solve_of(formulation: str, solver: str, *, checks: bool = True) -> CheckedSolve:
-    """A fresh `solve` for a law and a solver, both given by their selectors."""
+def solve_of(formulation: Selector, solver: Selector, *, checks: bool = True) -> CheckedSolve:
+    """Make a fresh `solve` for a formulation and a solver."""
     program = program_of(make_formulation(formulation))
     named = None if solver == NO_SOLVER else parse_solver(solver)
     return make_solve(named, program, checks=checks)
 
 
-def header(trial: Trial) -> Row:
-    """The columns that say which trial a row is of."""
-    return {
-        "formulation": trial.formulation,
-        "solver": trial.solver,
-        "scenario": trial.scenario,
-        "plant": trial.plant,
-        "reference": trial.reference,
-        "seed": trial.seed,
-    }
-
-
-def row_without_run(trial: Trial, status: Status, message: str) -> Row:
+def row_without_run(trial: Trial, status: Status, message: str) -> TrialRow:
     """The row of a trial of which nothing can be measured."""
-    return {**header(trial), "status": status.value, "message": message, "steps": 0}
+    return {**trial.row, "status": status.value, "message": message, "steps": 0}
 
 
 @lru_cache(maxsize=4)
-def _environment(commit: str | None, command: str) -> Row:
+def _environment(commit: str | None, command: str) -> TrialRow:
     return environment(commit, command)
 
 
 def work(
     trial: Trial, trace: Path, policy: TracePolicy, commit: str | None, command: str
-) -> tuple[Row, Row]:
+) -> tuple[TrialRow, TrialRow]:
     """Run a trial in a worker process, whatever its plug-ins do.
 
     Args:
@@ -99,13 +88,13 @@ def work(
         reason = f"{type(error).__name__}: {error}".partition("\n")[0]
         row = row_without_run(trial, Status.FORMULATION_ERROR, reason)
     except BaseException as error:  # such as SystemExit
-        reason = f"the law asked the process to end: {type(error).__name__}"
+        reason = f"the formulation asked the process to end: {type(error).__name__}"
         row = row_without_run(trial, Status.CRASHED, reason)
     calm_down()
     return row, _environment(commit, command)
 
 
-def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "all") -> Row:
+def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "all") -> TrialRow:
     """Run one trial.
 
     Args:
@@ -115,7 +104,7 @@ def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "al
 
     Returns:
         Its row: keys, status, message, number of steps, every metric; `wall_time_s` of the run and
-        of it `control_time_s`, in kinematics, law and solver (the rest is the harness's).
+        of it `control_time_s`, in kinematics, formulation and solver (the rest is the harness's).
 
     Raises:
         CannotStore: if the trace cannot be written.
@@ -127,7 +116,7 @@ def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "al
     if trial.reference == "path" and not scenario.reference.moving:
         reason = "the scenario has no path that could wait for the robot"
         return row_without_run(trial, Status.SKIPPED, reason)
-    oracle = trial.formulation == ORACLE
+    oracle = trial.formulation.name == ORACLE
     if oracle and scenario.oracle is None:
         reason = "no joint motion does what the scenario asks for"
         return row_without_run(trial, Status.SKIPPED, reason)
@@ -151,7 +140,7 @@ def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "al
         seen = None if plant.noise else run.jacobians  # with noise, not those of the true motion
         metrics = evaluate(recompute(run.trace, scenario, seen))
     return {
-        **header(trial),
+        **trial.row,
         "status": run.status.value,
         "message": run.message,
         "steps": run.trace.steps,

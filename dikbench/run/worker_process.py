@@ -69,7 +69,7 @@ def calm_down() -> None:
 
 
 def _die_with_the_driver() -> None:
-    """A law that loops for ever must not outlive a driver that was killed (Linux)."""
+    """A formulation that loops for ever must not outlive a driver that was killed (Linux)."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PARENT_DEATH_SIGNAL, signal.SIGKILL)
 

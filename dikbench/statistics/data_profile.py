@@ -1,7 +1,7 @@
-"""Data profiles: the share of problems that a law solves to each of a ladder of targets.
+"""Data profiles: the share of problems that a formulation solves to each of a ladder of targets.
 
-Where a performance profile compares with the best law, a data profile asks for an absolute error:
-no law's curve depends on the others.
+Where a performance profile compares with the best formulation, a data profile asks for an absolute
+error: no formulation's curve depends on the others.
 
 Source: Moré & Wild 2009, Benchmarking derivative-free optimization algorithms; targets in place of
 budgets as in Hansen et al. 2021, COCO.
@@ -15,10 +15,10 @@ from dikbench.arrays import Array
 
 
 def data_profile(errors: Array, targets: Array) -> Array:
-    """The share of the problems with an error below each target, (targets, laws).
+    """The share of the problems with an error below each target, (targets, formulations).
 
     Args:
-        errors: (problems, laws); infinite or NaN where a problem was not solved.
+        errors: (problems, formulations); infinite or NaN where a problem was not solved.
         targets: ascending, in the unit of the errors.
     """
     if not len(errors):

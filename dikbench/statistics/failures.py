@@ -5,13 +5,13 @@ A failed trial is never dropped and never turned into a time:
 - it stands in the failure rate, which comes first in every table;
 - in an average it takes its metric's `worst` value where that is finite (pi for an angle, 1 for a
   share of violating steps, 0 for a share of success); where it is infinite an average cannot carry
-  it and leaves it out, and such an average is not compared with those of other laws;
+  it and leaves it out, and such an average is not compared with those of other formulations;
 - in an extreme (the worst over scenarios) it takes the `worst` value, infinite or not;
 - in a performance or data profile it is a problem that was not solved: an infinite ratio.
 
 What a failed trial recorded before it broke off is not used: it would flatter an early failure.
 A skipped trial is no failure: the cell cannot work; it counts nowhere but in profiles, which
-compare laws on the same problems and take it as not solved.
+compare formulations on the same problems and take it as not solved.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def worst_value(metric: str) -> float:
     return METRICS[metric].worst if metric in METRICS else np.inf
 
 
-def with_failures(trials: pd.DataFrame, metric: str) -> Array:
+def failures_at_worst(trials: pd.DataFrame, metric: str) -> Array:
     """A metric of each trial, with failed trials at its worst value, which may be infinite."""
     recorded = trials[metric].to_numpy(dtype=float)
     return np.where(has_failed(trials), worst_value(metric), recorded)

@@ -7,7 +7,8 @@ cannot express this; on a flat sample the two agree.
 
 Drawn indices are never made: a family drawn c times has its S scenarios drawn c S times in all,
 which is one multinomial draw, and likewise for seeds. What is left are weights, the same for all
-laws and metrics (so that their differences are resampled together), and a product of matrices.
+formulations and metrics (so that their differences are resampled together), and a product of
+matrices.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ def mean_intervals(values: Array, weights: Array) -> Array:
     failure in ten trials is no proof of none).
 
     Args:
-        values: (n, k), a column per law; NaN counts nowhere.
+        values: (n, k), a column per formulation; NaN counts nowhere.
         weights: (resamples, n), of `draw_weights`.
     """
     defined = ~np.isnan(values)
@@ -70,9 +71,9 @@ def mean_intervals(values: Array, weights: Array) -> Array:
     tails = ((1 - COVERAGE) / 2, (1 + COVERAGE) / 2)
     intervals = np.full((values.shape[1], 2), np.nan)
     spread = _largest(values) > -_largest(-values)
-    for law in np.flatnonzero(spread):
-        hit = number[:, law] > 0
-        intervals[law] = np.quantile(sums[hit, law] / number[hit, law], tails)
+    for contender in np.flatnonzero(spread):
+        hit = number[:, contender] > 0
+        intervals[contender] = np.quantile(sums[hit, contender] / number[hit, contender], tails)
     return intervals
 
 

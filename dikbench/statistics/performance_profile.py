@@ -1,12 +1,12 @@
-"""Performance profiles: how often a law is within a factor of the best.
+"""Performance profiles: how often a formulation is within a factor of the best.
 
-Of problem p and law s with cost t_ps, the ratio is r_ps = t_ps / min_s t_ps and the profile
+Of problem p and formulation s with cost t_ps, the ratio is r_ps = t_ps / min_s t_ps and the profile
 rho_s(tau) the share of the problems with r_ps <= tau: rho_s(1) is how often s is the best, the
 limit for large tau how often it solves a problem at all.
 
-The best is taken over the laws at hand, so that the order of two laws can flip when a third is
-taken out (Gould & Scott 2016): profiles of all laws rank the first one only. Profiles of two laws
-alone stand beside them.
+The best is taken over the formulations at hand, so that the order of two formulations can flip when
+a third is taken out (Gould & Scott 2016): profiles of all formulations rank the first one only.
+Profiles of two formulations alone stand beside them.
 
 Source: Dolan & Moré 2002, Benchmarking optimization software with performance profiles; Gould &
 Scott 2016, A note on performance profiles for benchmarking software.
@@ -20,9 +20,10 @@ from dikbench.arrays import Array
 
 
 def performance_ratios(costs: Array) -> Array:
-    """r_ps, (problems, laws), infinite where a law did not solve a problem.
+    """r_ps, (problems, formulations), infinite where a formulation did not solve a problem.
 
-    Problems that no law solved stay, with infinite ratios: every profile ends below 1 by them.
+    Problems that no formulation solved stay, with infinite ratios: every profile ends below 1 by
+        them.
 
     Args:
         costs: t_ps > 0 (raise to a floor below which costs count as equal); infinite or NaN where
@@ -36,10 +37,10 @@ def performance_ratios(costs: Array) -> Array:
 
 
 def profile(ratios: Array, factors: Array) -> Array:
-    """rho_s at each factor tau, (factors, laws); NaN where there are no problems.
+    """rho_s at each factor tau, (factors, formulations); NaN where there are no problems.
 
     Args:
-        ratios: (problems, laws), of `performance_ratios`.
+        ratios: (problems, formulations), of `performance_ratios`.
         factors: taus >= 1, ascending.
     """
     if not len(ratios):
@@ -53,7 +54,7 @@ def area(ratios: Array, largest: float) -> Array:
     """The mean height of each profile over 1 <= tau <= largest on a logarithmic axis, (laws,).
 
     Args:
-        ratios: (problems, laws), of `performance_ratios`; at least one problem.
+        ratios: (problems, formulations), of `performance_ratios`; at least one problem.
         largest: tau at which the axis ends, above 1.
     """
     heights: Array = np.mean(1 - np.log(np.minimum(ratios, largest)) / np.log(largest), axis=0)

@@ -28,7 +28,7 @@ def verdict(samples: Array) -> str:
     calls this short the standard deviation says only that: hence medians and quartiles.
 
     Args:
-        samples: times, (rounds, problems); NaN where the law broke.
+        samples: times, (rounds, problems); NaN where the formulation broke.
 
     Returns:
         "stable", or what is wrong, with figures.

@@ -7,6 +7,7 @@ from types import MappingProxyType
 from typing import Final
 
 from dikbench.errors import DikbenchError
+from dikbench.selector import Selector
 from dikbench.study.identity import scenario_id
 
 SPLITS: Final[Mapping[str, range]] = MappingProxyType(
@@ -16,7 +17,11 @@ SPLITS: Final[Mapping[str, range]] = MappingProxyType(
 
 
 def check_split(
-    name: str, split: str, scenarios: Sequence[str], seeds: Sequence[int], others: Sequence[str]
+    name: str,
+    split: str,
+    scenarios: Sequence[Selector],
+    seeds: Sequence[int],
+    others: Sequence[Selector],
 ) -> None:
     """Check that a study keeps to its split.
 
@@ -37,9 +42,9 @@ def check_split(
                 f"study {name}: seed {seed} is not in the {split} split; "
                 f"valid: {allowed.start} to {allowed.stop - 1}"
             )
-    reserved = {scenario_id(text) for text in others}
-    for text in scenarios:
-        if scenario_id(text) in reserved:
+    reserved = {scenario_id(scenario) for scenario in others}
+    for scenario in scenarios:
+        if scenario_id(scenario) in reserved:
             raise DikbenchError(
-                f"study {name}: scenario {text!r} belongs to the other split than {split}"
+                f"study {name}: scenario {str(scenario)!r} belongs to the other split than {split}"
             )

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -11,34 +10,23 @@ from typing import Annotated, Any, Literal
 import msgspec
 
 from dikbench.errors import DikbenchError, unknown
-from dikbench.plugins.registry import (
-    make_formulation,
-    make_plant,
-    make_scenario,
-    scenario_parameters,
-)
+from dikbench.plugins.registry import make_formulation
 from dikbench.problem.problem import program_of
 from dikbench.programs.quadratic_program import Program
 from dikbench.scenario.oracle import ORACLE
 from dikbench.scenario.plant import REFERENCE_MODES
-from dikbench.selector import alternatives, parse_selector
-from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, parse_solver, why_not
-from dikbench.study.identity import trial_id
-from dikbench.study.split import SPLITS, check_split
-from dikbench.study.trial import NO_SOLVER, Trial
+from dikbench.selector import Selector, alternatives, parse_selector
+from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER
+from dikbench.study.split import SPLITS
 
 DEFAULT_STUDY = "quick"
-
-BUILT_AHEAD = 40
-"""So many scenarios of a study are built before anything runs; of the others, in studies with
-hundreds, the parameters are checked and a certificate that fails is a skipped row."""
 
 NOT_EMPTY = msgspec.Meta(min_length=1)
 Names = Annotated[tuple[str, ...], NOT_EMPTY]
 
 
 class Cells(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Formulations and the solvers with which each is run (none for laws that need none)."""
+    """Formulations and the solvers with which each is run (none where none is needed)."""
 
     formulations: Names
     solvers: tuple[str, ...] = ()
@@ -48,7 +36,7 @@ class TimingSettings(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """The timing pass.
 
     Attributes:
-        reference: the law whose run supplies the problems of each scenario.
+        reference: the formulation whose run supplies the problems of each scenario.
         problems: how many of them, contiguous, from the middle of the run.
         rounds: how often they are replayed.
         scenarios: which of the study's scenarios are timed; empty: all.
@@ -61,7 +49,7 @@ class TimingSettings(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Study(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """A selection of cells.
+    """A selection of cells; selectors stand in it as text.
 
     Attributes:
         description: one line.
@@ -85,14 +73,6 @@ class Study(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     example: str = ""
     timing: TimingSettings | None = None
     name: str = ""
-
-
-class PlannedTrial(msgspec.Struct, frozen=True):
-    """A trial, its id, and why it cannot run, if it cannot."""
-
-    id: str
-    trial: Trial
-    skip: str = ""
 
 
 def shipped_studies() -> dict[str, Path]:
@@ -129,21 +109,23 @@ def load_study(name_or_file: str) -> Study:
 
 def _spread(study: Study) -> Study:
     """The study with one value per parameter in each of its selectors (see `alternatives`)."""
-    cells = tuple(Cells(_each(c.formulations), _each(c.solvers)) for c in study.cells)
-    timing = study.timing
+    timing, example = study.timing, study.example
     if timing is not None:
         timing = msgspec.structs.replace(timing, scenarios=_each(timing.scenarios))
     return msgspec.structs.replace(
         study,
-        cells=cells,
+        cells=tuple(Cells(_each(c.formulations), _each(c.solvers)) for c in study.cells),
         scenarios=_each(study.scenarios),
         plants=_each(study.plants),
+        example=str(parse_selector(example)) if example else "",
         timing=timing,
     )
 
 
-def _each(selectors: Sequence[str]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(text for given in selectors for text in alternatives(given)))
+def _each(selectors: Iterable[str]) -> tuple[str, ...]:
+    """Every selector that a list of them stands for, in its canonical text, each once."""
+    found = dict.fromkeys(one for given in selectors for one in alternatives(given))
+    return tuple(map(str, found))
 
 
 def _explained(reason: str) -> str:
@@ -190,7 +172,8 @@ def select(base: Study, selection: Selection, *, named: bool) -> Study:
     )
     cells = base.cells
     if selection.formulations:
-        cells = tuple(_cells_for(base, text, named) for text in selection.formulations)
+        chosen = map(parse_selector, selection.formulations)
+        cells = tuple(_cells_for(base, formulation, named) for formulation in chosen)
     if selection.solvers:
         cells = tuple(msgspec.structs.replace(c, solvers=selection.solvers) for c in cells)
     changes: dict[str, Any] = {
@@ -207,72 +190,19 @@ def select(base: Study, selection: Selection, *, named: bool) -> Study:
     return msgspec.structs.replace(base, cells=cells, **changes)
 
 
-def _cells_for(base: Study, text: str, named: bool) -> Cells:
-    program = _program(text)
+def _cells_for(base: Study, formulation: Selector, named: bool) -> Cells:
+    program = _program(formulation)
     if program is None:
-        return Cells((text,))
+        return Cells((str(formulation),))
     if named:
         for cell in base.cells:
-            if parse_selector(text).name in {parse_selector(f).name for f in cell.formulations}:
-                return Cells((text,), cell.solvers)
-    return Cells((text,), (DEFAULT_SOLVER[program],))
+            if formulation.name in {parse_selector(text).name for text in cell.formulations}:
+                return Cells((str(formulation),), cell.solvers)
+    return Cells((str(formulation),), (DEFAULT_SOLVER[program],))
 
 
-def expand(study: Study) -> list[PlannedTrial]:
-    """Every trial of a study, in a fixed order, each once.
-
-    Names, parameters and solvers are checked, and the first scenarios are built, so that a mistake
-    shows before anything runs. A pair of law and solver that cannot work is kept,
-    with the reason.
-
-    Raises:
-        DikbenchError: on the first selector that does not name anything valid.
-    """
-    for number, scenario in enumerate(study.scenarios):
-        if number < BUILT_AHEAD:
-            make_scenario(scenario, study.seeds[0])
-        else:
-            scenario_parameters(scenario)
-    for plant in study.plants:
-        make_plant(plant)
-    if study.split:
-        other = "test" if study.split == "train" else "train"
-        others = load_study(other).scenarios
-        check_split(study.name, study.split, study.scenarios, study.seeds, others)
-    if study.timing is not None and program_of(make_formulation(study.timing.reference)):
-        raise DikbenchError(
-            f"study {study.name}: timing.reference {study.timing.reference!r} needs a solver; "
-            "name a law that needs none"
-        )
-    planned: dict[str, PlannedTrial] = {}
-    for cells in study.cells:
-        for formulation in cells.formulations:
-            for solver, skip in _solvers_for(study, formulation, cells.solvers):
-                plants, references = study.plants, study.references
-                if formulation == ORACLE:  # nothing is fed back: there is one way to run it
-                    plants, references = ("ideal",), ("time",)
-                for scenario, plant, reference, seed in itertools.product(
-                    study.scenarios, plants, references, study.seeds
-                ):
-                    trial = Trial(formulation, scenario, solver, plant, reference, seed)
-                    name = trial_id(trial)
-                    planned.setdefault(name, PlannedTrial(name, trial, skip))
-    return list(planned.values())
-
-
-def _program(formulation: str) -> Program | None:
-    """What a law needs a solver for; the oracle needs none."""
-    return None if formulation == ORACLE else program_of(make_formulation(formulation))
-
-
-def _solvers_for(study: Study, formulation: str, solvers: Sequence[str]) -> list[tuple[str, str]]:
-    """The solvers with which a law runs, each with the reason if the pair cannot work."""
-    program = _program(formulation)
-    parsed = [(text, parse_solver(text)) for text in solvers]
-    if program is None:
-        return [(NO_SOLVER, "")]
-    if not parsed:
-        raise DikbenchError(
-            f"study {study.name}: formulation {formulation!r} needs a solver, its cells name none"
-        )
-    return [(text, why_not(solver, program)) for text, solver in parsed]
+def _program(formulation: Selector) -> Program | None:
+    """Return what a formulation needs a solver for; the oracle needs none."""
+    if formulation.name == ORACLE:
+        return None
+    return program_of(make_formulation(formulation))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from dikbench.simulation.status import Status
+from dikbench.study.trial import NO_SOLVER
 from dikbench.viewer.limit_use import NEAR_SHARE, Nearness
 from dikbench.viewer.recording import Recording
 
@@ -26,7 +27,7 @@ LEGEND: Final = (
 def captions(recording: Recording, speed: float) -> list[str]:
     """What is replayed, in lines."""
     trial, trace = recording.trial, recording.trace
-    solver = "" if trial.solver == "none" else f" with {trial.solver}"
+    solver = "" if trial.solver == NO_SOLVER else f" with {trial.solver}"
     ended = "" if recording.status == Status.OK.value else f", ended {recording.status}"
     lines = [
         f"{trial.formulation}{solver} on {trial.scenario}",
@@ -34,5 +35,7 @@ def captions(recording: Recording, speed: float) -> list[str]:
         f"{trace.steps * trace.dt:.4g} s{ended}, replayed at {speed:g} times the speed",
     ]
     if not recording.is_current:
-        lines.append("The source of law or scenario has changed since: the target may be another.")
+        lines.append(
+            "The source of formulation or scenario has changed since: the target may be another."
+        )
     return lines

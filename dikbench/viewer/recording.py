@@ -8,8 +8,10 @@ from typing import Any, Final
 
 from dikbench.errors import DikbenchError
 from dikbench.plugins.registry import make_scenario
+from dikbench.results.columns import TRIAL
 from dikbench.results.exports import TRIALS
 from dikbench.results.folder import ResultsFolder
+from dikbench.results.reading import read_results
 from dikbench.scenario.scenario import Scenario
 from dikbench.simulation.trace import Trace
 from dikbench.study.identity import trial_id
@@ -39,7 +41,7 @@ class Recording:
 
     @property
     def is_current(self) -> bool:
-        """Whether law and scenario still have the source with which the trial was run."""
+        """Whether formulation and scenario still have the source with which the trial was run."""
         return trial_id(self.trial) == self.id
 
 
@@ -60,7 +62,7 @@ def find_recording(text: str, results: Path | None = None) -> Recording:
         results = results or file.absolute().parents[1]
         text = file.stem
     folder = ResultsFolder(results or newest_results(Path("runs")))
-    rows = folder.read()[0]
+    rows = read_results(folder.path).trials
     found = rows[rows["id"].str.startswith(text)].to_dict("records")
     if len(found) != 1:
         raise DikbenchError(_which(text, found, folder.path))
@@ -70,7 +72,7 @@ def find_recording(text: str, results: Path | None = None) -> Recording:
             f"trial {row['id']} ({row['status']}) has no trace in {folder.traces}; "
             "`dikbench run --traces all` keeps them"
         )
-    trial = Trial(**{name: row[name] for name in Trial.__dataclass_fields__})
+    trial = Trial.of(**{name: row[name] for name in TRIAL})
     scenario = make_scenario(trial.scenario, trial.seed)
     return Recording(row["id"], trial, row["status"], Trace.load(trace), scenario)
 

@@ -10,7 +10,7 @@ import pinocchio as pin
 from pinocchio.visualize import MeshcatVisualizer
 
 from dikbench.arrays import Array, Indices
-from dikbench.report.figures.scenario import stick
+from dikbench.report.figures.scenario_drawing import stick
 from dikbench.robots.robot import Robot
 from dikbench.viewer.animation import Moving, animation
 from dikbench.viewer.legend import COLOURS, WANTED

@@ -169,7 +169,7 @@ def harness(trials: int) -> list[float]:
         for number in range(trials + 1):
             wall = control = 0.0
             for law, solver in HARNESS_MIX:
-                trial = Trial(law, HARNESS_SCENARIO, solver, "ideal", "time", 0)
+                trial = Trial.of(law, HARNESS_SCENARIO, solver, "ideal", "time", 0)
                 row = run_trial(trial, Path(folder) / "trace.arrow")
                 wall += row["wall_time_s"]
                 control += row["control_time_s"]

@@ -13,6 +13,7 @@ import pytest
 from dikbench.metrics import METRICS
 from dikbench.report.write import write_report
 from dikbench.results.columns import KEYS, TIMES
+from dikbench.results.selected import with_selected
 from dikbench.run.runner import RunSettings, run_study
 from dikbench.study.study import Selection, load_study, select
 
@@ -36,9 +37,9 @@ FAULTLESS: Values = {
     "environment": "e",
     "run": 1,
     **dict.fromkeys(TIMES, float("nan")),
-    "timing_verdict": None,
+    "timing_stability": None,
 }
-"""A trial of a law without a solver, without a fault and without times."""
+"""A trial of a formulation without a solver, without a fault and without times."""
 
 
 @pytest.fixture(scope="session")
@@ -57,22 +58,24 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def make_rows() -> MakeRows:
-    """A function that makes a row per law, scenario and seed.
+    """A function that makes a row per formulation, scenario and seed.
 
-    Its first argument maps a law, or law and solver, to what differs from a faultless trial; a
-    value may be a list, with an entry per scenario.
+    Its first argument maps a formulation, or formulation and solver, to what differs from a
+    faultless trial; a value may be a list, with an entry per scenario.
     """
 
     def make(
-        laws: Mapping[str | tuple[str, str], Values],
+        formulations: Mapping[str | tuple[str, str], Values],
         scenarios: Sequence[str] = ("reach",),
         seeds: Sequence[int] = (0,),
         plant: str = "ideal",
         reference: str = "time",
     ) -> pd.DataFrame:
         rows = []
-        for law, values in laws.items():
-            formulation, solver = law if isinstance(law, tuple) else (law, "none")
+        for formulation, values in formulations.items():
+            formulation, solver = (
+                formulation if isinstance(formulation, tuple) else (formulation, "none")
+            )
             for number, scenario in enumerate(scenarios):
                 of_scenario = {
                     name: value[number] if isinstance(value, list) else value
@@ -82,7 +85,7 @@ def make_rows() -> MakeRows:
                     how = (formulation, solver, scenario, plant, reference, seed)
                     keys = dict(zip(KEYS, how, strict=False))
                     rows.append({"id": f"{len(rows)}", **keys, **FAULTLESS, **of_scenario})
-        return pd.DataFrame(rows)
+        return with_selected(pd.DataFrame(rows))
 
     return make
 

@@ -13,7 +13,8 @@ from pathlib import Path
 
 from dikbench.results.folder import ResultsFolder
 from dikbench.run.runner import RunSettings, run_study
-from dikbench.study.study import Cells, Study, expand
+from dikbench.study.plan import expand
+from dikbench.study.study import Cells, Study
 
 
 def study_of(trials: int) -> Study:

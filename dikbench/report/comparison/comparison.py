@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pandas as pd
 
-from dikbench.report.comparison.differences import law_differences, trial_differences
+from dikbench.report.comparison.differences import formulation_differences, trial_differences
 from dikbench.report.comparison.matching import MatchedTrials, match_trials
 from dikbench.report.comparison.times import time_ratios
 from dikbench.report.comparison.tolerances import Tolerance
 from dikbench.report.comparison.versions import same_machine, version_differences
-from dikbench.results.folder import ResultsFolder
+from dikbench.results.reading import read_results
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +23,7 @@ class Comparison:
     Attributes:
         a, b: the folders.
         matched: their trials.
-        laws: see `law_differences`.
+        formulations: see `formulation_differences`.
         times: see `time_ratios`.
         versions: see `version_differences`.
         same_machine: whether times can be compared at all.
@@ -33,7 +33,7 @@ class Comparison:
     a: Path
     b: Path
     matched: MatchedTrials
-    laws: pd.DataFrame
+    formulations: pd.DataFrame
     times: pd.DataFrame
     versions: list[tuple[str, str, str]]
     same_machine: bool
@@ -42,7 +42,7 @@ class Comparison:
     @property
     def beyond(self) -> int:
         """Number of metrics of trials that are beyond a tolerance."""
-        return int(self.laws["beyond"].sum()) if len(self.laws) else 0
+        return int(self.formulations["beyond"].sum()) if len(self.formulations) else 0
 
     @property
     def regressed(self) -> bool:
@@ -61,15 +61,15 @@ def compare(a: Path, b: Path, tolerances: Sequence[Tolerance] = ()) -> Compariso
         DikbenchError: if one of them holds no results, they have nothing in common, or a tolerance
             is on a metric that one of them lacks.
     """
-    (trials_a, manifest_a), (trials_b, manifest_b) = (ResultsFolder(p).read() for p in (a, b))
-    matched = match_trials(trials_a, trials_b, (str(a), str(b)))
+    of_a, of_b = read_results(a), read_results(b)
+    matched = match_trials(of_a.trials, of_b.trials, (str(a), str(b)))
     return Comparison(
         a,
         b,
         matched,
-        law_differences(matched, tolerances),
+        formulation_differences(matched, tolerances),
         time_ratios(matched),
-        version_differences(manifest_a, manifest_b),
-        same_machine(manifest_a, manifest_b),
+        version_differences(of_a.manifest, of_b.manifest),
+        same_machine(of_a.manifest, of_b.manifest),
         bool(tolerances),
     )

@@ -1,4 +1,4 @@
-"""Differences of metrics, B - A: per trial, and per law with intervals."""
+"""Differences of metrics, B - A: per trial, and per formulation with intervals."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import pandas as pd
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.metrics import METRICS
-from dikbench.report.comparison.matching import TRIAL, MatchedTrials
+from dikbench.report.comparison.matching import MatchedTrials
 from dikbench.report.comparison.tolerances import Tolerance
-from dikbench.selector import parse_selector
+from dikbench.results.columns import TRIAL
 from dikbench.statistics.hierarchical_bootstrap import draw_weights, mean_intervals
 
-LAW: Final = ["formulation", "solver", "plant", "reference"]
-"""What is told apart; families, scenarios and seeds are averaged over."""
+GROUPS: Final = ["formulation", "solver", "plant", "reference"]
+"""What has a row of its own; families, scenarios and seeds are averaged over."""
 
 SMALL: Final = 1e-4
 """To sort by them, worsenings are put in relation to the value in A, but to no less than this [m,
@@ -53,7 +53,9 @@ def trial_differences(matched: MatchedTrials) -> pd.DataFrame:
         apart, worse = difference(a, b), worsening(metric, a, b)
         changed = apart != 0
         frames.append(
-            _trials(matched)[changed].assign(
+            _trials(matched)
+            .loc[changed, TRIAL]
+            .assign(
                 metric=metric,
                 a=a[changed],
                 b=b[changed],
@@ -66,14 +68,16 @@ def trial_differences(matched: MatchedTrials) -> pd.DataFrame:
     return pd.concat([frame for frame in frames if len(frame)] or frames).iloc[order]
 
 
-def law_differences(matched: MatchedTrials, tolerances: Sequence[Tolerance] = ()) -> pd.DataFrame:
-    """A row per law and metric that differs in any trial, regressions first.
+def formulation_differences(
+    matched: MatchedTrials, tolerances: Sequence[Tolerance] = ()
+) -> pd.DataFrame:
+    """Return a row per formulation and metric that differs in any trial, regressions first.
 
     First come rows with a trial beyond a tolerance, then the others; among each, those with the
     largest worsening of a trial in relation to its value in A, and last those without any.
 
     Returns:
-        The columns of `LAW`, and
+        The columns of `GROUPS`, and
         metric: its name;
         trials: how many ended well in both;
         beyond, worse, better: how many of them are beyond a tolerance, became worse, better;
@@ -94,12 +98,12 @@ def law_differences(matched: MatchedTrials, tolerances: Sequence[Tolerance] = ()
             )
     trials, values = _trials(matched), _values(matched)
     rows = []
-    laws: Any = trials.groupby(LAW, sort=False).indices
-    for law, places in laws.items():
+    groups: Any = trials.groupby(GROUPS, sort=False).indices
+    for group, places in groups.items():
         here = {metric: (a[places], b[places]) for metric, (a, b) in values.items()}
         changed = {m: (a, b) for m, (a, b) in here.items() if (difference(a, b) != 0).any()}
         if changed:
-            named = dict(zip(LAW, law, strict=True))
+            named = dict(zip(GROUPS, group, strict=True))
             rows += [{**named, **row} for row in _rows(trials.iloc[places], changed, tolerances)]
     if not rows:
         return pd.DataFrame()
@@ -113,9 +117,8 @@ def _rows(
     changed: dict[str, tuple[Array, Array]],
     tolerances: Sequence[Tolerance],
 ) -> list[dict[str, Any]]:
-    """The rows of one law: of n trials, values in A and B (n,) of each metric that changed."""
-    families = [parse_selector(text).name for text in trials["scenario"]]
-    weights = draw_weights(families, list(trials["scenario"]))
+    """Return the rows of one formulation: per metric that changed its values in A and B, (n,)."""
+    weights = draw_weights(list(trials["scenario_family"]), list(trials["scenario"]))
     finite = {
         metric: np.where(np.isfinite(a) & np.isfinite(b), b - a, np.nan)
         for metric, (a, b) in changed.items()
@@ -148,8 +151,8 @@ def _rows(
 
 
 def _trials(matched: MatchedTrials) -> pd.DataFrame:
-    """The trials that ended well in both."""
-    return matched.a.loc[matched.both_ok, TRIAL]
+    """Return the trials that ended well in both."""
+    return matched.a.loc[matched.both_ok, [*TRIAL, "scenario_family"]]
 
 
 def _values(matched: MatchedTrials) -> dict[str, tuple[Array, Array]]:

@@ -12,11 +12,10 @@ import pandas as pd
 
 from dikbench.errors import DikbenchError
 from dikbench.metrics import METRICS
-from dikbench.results.columns import KEYS
+from dikbench.results.columns import SELECTORS, TRIAL
+from dikbench.results.selected import selected_columns
 from dikbench.simulation.status import Status
-
-TRIAL: Final = [key for key in KEYS if key not in {"status", "message"}]
-"""What makes two trials the same trial: selectors and seed, whatever the versions."""
+from dikbench.study.trial import Trial
 
 RANKS: Final[Mapping[str, int]] = MappingProxyType({Status.OK.value: 2, Status.SKIPPED.value: 1})
 """How good a status is; every other one is a failure, 0."""
@@ -70,7 +69,7 @@ class MatchedTrials:
 
     @property
     def other_ids(self) -> int:
-        """Number of trials whose law or scenario has another source in B."""
+        """Number of trials whose formulation or scenario has another source in B."""
         if "id" not in self.a or "id" not in self.b:
             return 0
         return int((self.a["id"] != self.b["id"]).sum())
@@ -115,17 +114,25 @@ def match_trials(
 
 
 def trial_name(row: Mapping[Any, Any]) -> str:
-    """A trial in words."""
-    solver = "" if row["solver"] == "none" else f" with {row['solver']}"
-    how = f"{row['plant']} plant, {row['reference']}, seed {row['seed']}"
-    return f"{row['formulation']}{solver} on {row['scenario']} ({how})"
+    """Name the trial of a row in words."""
+    return str(Trial.of(**{name: row[name] for name in TRIAL}))
+
+
+def _own_columns(rows: pd.DataFrame) -> pd.Index:
+    """Return the columns that the folder itself has, without the parts of selectors."""
+    parts = {
+        name
+        for column, head in SELECTORS.items()
+        for name in (f"{column}_{head}", *selected_columns(rows, column).values())
+    }
+    return rows.columns.difference(list(parts))
 
 
 def _unmatched_columns(a: pd.DataFrame, b: pd.DataFrame) -> tuple[str, ...]:
     said = []
     for name, other, columns in (
-        ("A", "B", a.columns.difference(b.columns)),
-        ("B", "A", b.columns.difference(a.columns)),
+        ("A", "B", _own_columns(a).difference(_own_columns(b))),
+        ("B", "A", _own_columns(b).difference(_own_columns(a))),
     ):
         if len(columns):
             said.append(f"{name} has {', '.join(columns)}, which {other} lacks")

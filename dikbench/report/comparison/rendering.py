@@ -56,17 +56,17 @@ def write(comparison: Comparison, file: Path) -> None:
 
 
 def _verdict(comparison: Comparison) -> str:
-    matched, laws = comparison.matched, comparison.laws
+    matched, formulations = comparison.matched, comparison.formulations
     told = [f"{len(matched.a)} trials are in both, {int(matched.both_ok.sum())} ended ok in both."]
     worse = matched.newly_failed
     if len(matched.status_changes):
         told.append(f"{len(matched.status_changes)} changed their status, {worse} to the worse.")
-    if laws.empty:
+    if formulations.empty:
         told.append("No metric differs.")
     else:
         told.append(
-            f"Of a law's metrics, {int((laws['worse'] > 0).sum())} became worse in some trial and "
-            f"{int((laws['worse'] == 0).sum())} in none."
+            f"Of the metrics {int((formulations['worse'] > 0).sum())} became worse in a trial and "
+            f"{int((formulations['worse'] == 0).sum())} in none."
         )
     if comparison.guarded:
         beyond = comparison.beyond
@@ -91,13 +91,13 @@ def _statuses(comparison: Comparison, rows: int | None) -> list[str]:
 
 
 def _metrics(comparison: Comparison, rows: int | None) -> list[str]:
-    laws = comparison.laws
-    if laws.empty:
+    formulations = comparison.formulations
+    if formulations.empty:
         return []
-    head = laws.head(_most(rows, laws))
+    head = formulations.head(_most(rows, formulations))
     columns = {
         "metric": head["metric"],
-        "law": head["formulation"],
+        "formulation": head["formulation"],
         "solver": head["solver"],
         "plant": head["plant"],
         "reference": head["reference"],
@@ -118,7 +118,7 @@ def _metrics(comparison: Comparison, rows: int | None) -> list[str]:
         del columns["beyond"]
     return [
         "## Metrics",
-        "\n".join([markdown_rows(pd.DataFrame(columns)), *_more(rows, laws)]),
+        "\n".join([markdown_rows(pd.DataFrame(columns)), *_more(rows, formulations)]),
     ]
 
 
@@ -130,7 +130,7 @@ def _times(comparison: Comparison, rows: int | None) -> list[str]:
     head = times.head(_most(rows, times))
     table = pd.DataFrame(
         {
-            "law": head["formulation"],
+            "formulation": head["formulation"],
             "solver": head["solver"],
             "scenarios": head["scenarios"],
             "median, B over A": head["ratio"].map(_number),
@@ -141,7 +141,7 @@ def _times(comparison: Comparison, rows: int | None) -> list[str]:
             "unstable": head["unstable"],
         }
     )
-    told = ["Ratios of the law's time with its solver, geometric mean over scenarios."]
+    told = ["Ratios of the formulation's time with its solver, geometric mean over scenarios."]
     if not comparison.same_machine:
         told.append("The machines differ: these ratios say nothing of the code alone.")
     unstable, cells = int(times["unstable"].sum()), int(times["scenarios"].sum())
@@ -168,7 +168,7 @@ def _versions(comparison: Comparison) -> list[str]:
     if comparison.matched.other_ids:
         told.append(
             f"{comparison.matched.other_ids} of the trials in both have another id: the source of "
-            "their law or of their scenario differs."
+            "their formulation or of their scenario differs."
         )
     if comparison.versions:
         table = pd.DataFrame(comparison.versions, columns=["what", "A", "B"])

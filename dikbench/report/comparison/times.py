@@ -8,35 +8,33 @@ import numpy as np
 import pandas as pd
 
 from dikbench.report.comparison.matching import MatchedTrials
-from dikbench.results.columns import CELL
-from dikbench.selector import parse_selector
+from dikbench.results.columns import TIMED
 from dikbench.statistics.hierarchical_bootstrap import draw_weights, mean_intervals
 from dikbench.statistics.stability import STABLE
 
-COMPARED: Final = ("law_time_median_us", "law_time_p99_us")
+COMPARED: Final = ("formulation_time_median_us", "formulation_time_p99_us")
 
 
 def time_ratios(matched: MatchedTrials) -> pd.DataFrame:
-    """A row per law and solver with times in both: geometric means over scenarios of B / A.
+    """A row per formulation and solver with times in both: geometric means over scenarios of B / A.
 
     Returns:
         Columns `formulation`, `solver`, `scenarios`, `ratio` of the medians with its interval
         `low`, `high`, `p99_ratio`, and `unstable`: at how many of the scenarios a time of A or of
         B is not stable.
     """
-    wanted = [*COMPARED, "timing_verdict"]
+    wanted = [*COMPARED, "timing_stability"]
     if not all(name in rows for rows in (matched.a, matched.b) for name in wanted):
         return pd.DataFrame()
-    a, b = (rows[[*CELL, *wanted]] for rows in (matched.a, matched.b))
-    timed = (a[COMPARED[0]] > 0) & (b[COMPARED[0]] > 0) & ~a.duplicated(CELL)
+    a, b = (rows[[*TIMED, "scenario_family", *wanted]] for rows in (matched.a, matched.b))
+    timed = (a[COMPARED[0]] > 0) & (b[COMPARED[0]] > 0) & ~a.duplicated(TIMED)
     rows: list[dict[str, Any]] = []
-    for (formulation, solver), cells in a[timed].groupby(CELL[:2], sort=False):
+    for (formulation, solver), cells in a[timed].groupby(TIMED[:2], sort=False):
         other = b.loc[cells.index]
         logs = np.column_stack([np.log(other[name] / cells[name]) for name in COMPARED])
-        families = [parse_selector(text).name for text in cells["scenario"]]
-        weights = draw_weights(families, list(cells["scenario"]))
+        weights = draw_weights(list(cells["scenario_family"]), list(cells["scenario"]))
         low, high = np.exp(mean_intervals(logs[:, :1], weights)[0])
-        stable = cells["timing_verdict"].eq(STABLE) & other["timing_verdict"].eq(STABLE)
+        stable = cells["timing_stability"].eq(STABLE) & other["timing_stability"].eq(STABLE)
         ratio, p99_ratio = np.exp(logs.mean(axis=0))
         rows.append(
             {

@@ -1,1 +1,1 @@
-"""What a report holds: the laws, families and references of its rows."""
+"""What a report holds: the formulations, families and references of its rows."""

@@ -11,7 +11,12 @@ from typing import Any
 import pandas as pd
 
 from dikbench.metrics import METRICS
-from dikbench.report.contents.laws_and_families import Family, Law, families_of, laws_of
+from dikbench.report.contents.formulations_and_families import (
+    Family,
+    FormulationOfRun,
+    families_of,
+    formulations_of,
+)
 from dikbench.report.drawing.figure import Figure
 from dikbench.report.sentences.limitations import Limitation, limitations, missing
 from dikbench.report.sentences.summary import Summary, summarise
@@ -19,7 +24,7 @@ from dikbench.report.tables.build import make_table
 from dikbench.report.tables.kinds import KINDS
 from dikbench.report.tables.return_codes import return_codes
 from dikbench.report.tables.table import Table
-from dikbench.results.lenient_reading import Results
+from dikbench.results.reading import Results
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +37,7 @@ class Contents:
         tables: tracking error, limit violation, timing.
         return_codes: a row per solver.
         families: the scenario families of the run.
-        laws: its laws.
+        formulations: its formulations.
         limitations: what to keep in mind.
         figures: what was drawn.
     """
@@ -42,7 +47,7 @@ class Contents:
     tables: Sequence[Table]
     return_codes: pd.DataFrame
     families: Sequence[Family]
-    laws: Sequence[Law]
+    formulations: Sequence[FormulationOfRun]
     limitations: Sequence[Limitation]
     figures: Sequence[Figure]
 
@@ -67,13 +72,13 @@ class Contents:
         """How many trials there are, and how they ended; what did not occur is left out."""
         trials = self.results.trials
         status = trials["status"]
-        laws = trials[["formulation", "solver"]].drop_duplicates()
+        formulations = trials[["formulation", "solver"]].drop_duplicates()
         found = [
             (len(trials), "trials"),
             (int((~status.isin(["ok", "skipped"])).sum()), "failed"),
             (int(status.eq("skipped").sum()), "skipped"),
             (missing(trials, self.manifest), "missing"),
-            (len(laws), "laws with their solvers"),
+            (len(formulations), "formulations with their solvers"),
             (trials["scenario"].nunique(), "scenarios"),
             (trials["seed"].nunique(), "seeds" if trials["seed"].nunique() > 1 else "seed"),
         ]
@@ -124,7 +129,7 @@ def gather(results: Results, figures: Sequence[Figure]) -> Contents:
         [make_table(kind, measured) for kind in KINDS],
         return_codes(trials),
         families_of(trials),
-        laws_of(trials),
+        formulations_of(trials),
         limitations(trials, results.manifest, results.notes),
         figures,
     )

@@ -1,4 +1,4 @@
-"""Small multiples: a panel for each law, on shared axes."""
+"""Small multiples: a panel for each formulation, on shared axes."""
 
 from __future__ import annotations
 

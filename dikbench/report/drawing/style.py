@@ -88,8 +88,8 @@ def marker(number: int) -> dict[str, Any]:
     }
 
 
-def law_name(formulation: str, solver: str) -> str:
-    """How a law and its solver are called in a picture."""
+def contender_name(formulation: str, solver: str) -> str:
+    """How a formulation and its solver are called in a picture."""
     return formulation if solver == "none" else f"{formulation}, {solver}"
 
 

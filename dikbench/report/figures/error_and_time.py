@@ -1,4 +1,4 @@
-"""Error against the time of a call: what accuracy costs, per law and solver."""
+"""Error against the time of a call: what accuracy costs, per formulation and solver."""
 
 from __future__ import annotations
 
@@ -10,8 +10,14 @@ import pandas as pd
 from dikbench.report.drawing.figure import Figure
 from dikbench.report.drawing.labels import label_points
 from dikbench.report.drawing.style import COLOURS, WIDTH, logarithmic, save, short
-from dikbench.report.selection.rows import LEAST_ERROR, error_column, how, one_way, with_failures
-from dikbench.results.columns import CELL
+from dikbench.report.selection.rows import (
+    LEAST_ERROR,
+    error_column,
+    failures_at_infinity,
+    how,
+    one_way,
+)
+from dikbench.results.columns import TIMED
 from dikbench.statistics.stability import STABLE
 
 OUTER = 1.8
@@ -19,7 +25,7 @@ OUTER = 1.8
 
 
 def draw_error_and_time(ran: pd.DataFrame, target: Path) -> list[Figure]:
-    """Draw a point per law and solver, over the cells that were timed."""
+    """Draw a point per formulation and solver, over the cells that were timed."""
     rows = one_way(ran)
     table = cost_points(rows)
     if table.empty:
@@ -49,14 +55,16 @@ def draw_error_and_time(ran: pd.DataFrame, target: Path) -> list[Figure]:
     figure.legend(*axis.get_legend_handles_labels(), loc="outside upper center", ncols=4)
     colours = [COLOURS[1] if with_solver else COLOURS[0] for with_solver in solving]
     points = table[["time", "error"]].to_numpy()
-    nameless = label_points(axis, points, [short(str(law)) for law in table.index], colours)
+    nameless = label_points(
+        axis, points, [short(str(contender)) for contender in table.index], colours
+    )
     caption = (
         f"Median rms {name} against the median 99 % quantile of the time of one call, over the "
         f"scenarios that were timed, {how(rows)}, a point per law and solver. Best is the lower "
         "left corner. Laws that fail in half of them are left out. Compare ratios: absolute times "
         f"belong to the machine in the manifest.{nameless}"
     )
-    file = save(figure, target, "error_against_time_per_law")
+    file = save(figure, target, "error_against_time_per_formulation")
     return [Figure(file, caption, f"{name[0].upper()}{name[1:]} against time of a call")]
 
 
@@ -64,18 +72,18 @@ def cost_points(rows: pd.DataFrame) -> pd.DataFrame:
     """Medians over the timed cells of each law and solver: `time` [us], `error` [mm], `stable`."""
     column, _ = error_column(rows)
     cells = (
-        rows.assign(error=(1e3 * with_failures(rows, column)))
-        .groupby([*CELL, "law"], sort=False, dropna=False)
+        rows.assign(error=(1e3 * failures_at_infinity(rows, column)))
+        .groupby([*TIMED, "contender"], sort=False, dropna=False)
         .agg(
             error=("error", "median"),
-            time=("law_time_p99_us", "first"),
-            verdict=("timing_verdict", "first"),
+            time=("formulation_time_p99_us", "first"),
+            verdict=("timing_stability", "first"),
         )
         .reset_index()
     )
     cells = cells[cells["time"].gt(0) & cells["error"].notna()]
     cells = cells.assign(stable=cells["verdict"].eq(STABLE))
-    table = cells.groupby("law", sort=False).agg(
+    table = cells.groupby("contender", sort=False).agg(
         solver=("solver", "first"),
         error=("error", "median"),
         time=("time", "median"),

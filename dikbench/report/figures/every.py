@@ -10,8 +10,8 @@ import pandas as pd
 from dikbench.report.drawing.figure import Figure
 from dikbench.report.drawing.style import style
 from dikbench.report.figures.error_and_time import draw_error_and_time
+from dikbench.report.figures.formulation_sweeps import draw_formulation_sweeps
 from dikbench.report.figures.joint_margins import draw_joint_margins
-from dikbench.report.figures.law_sweeps import draw_law_sweeps
 from dikbench.report.figures.pareto import draw_off_course_and_slow_down
 from dikbench.report.figures.phase_diagram import draw_phase_diagrams
 from dikbench.report.figures.profiles import draw_profiles
@@ -37,16 +37,16 @@ def draw_figures(
     ran = that_ran(trials)
     if ran.empty:
         return []
-    laws = one_solver_each(ran)
+    formulations = one_solver_each(ran)
     example = manifest["study"].get("example") or str(ran["scenario"].iloc[0])
     with style():
         return [
-            *draw_phase_diagrams(laws, target),
-            *draw_sweeps(laws, target),
-            *draw_off_course_and_slow_down(laws, target),
-            *draw_time_series(folder, laws, example, target),
-            *draw_joint_margins(folder, laws, example, target),
-            *draw_law_sweeps(laws, target),
+            *draw_phase_diagrams(formulations, target),
+            *draw_sweeps(formulations, target),
+            *draw_off_course_and_slow_down(formulations, target),
+            *draw_time_series(folder, formulations, example, target),
+            *draw_joint_margins(folder, formulations, example, target),
+            *draw_formulation_sweeps(formulations, target),
             *draw_profiles(trials, target),
             *draw_error_and_time(ran, target),
             *draw_time_split(ran, target),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -14,6 +13,7 @@ from dikbench.metrics.motion import Motion
 from dikbench.report.drawing.figure import Figure
 from dikbench.report.drawing.style import COLOURS, WIDTH, look, save, short
 from dikbench.report.selection.rows import how, one_way
+from dikbench.report.selection.situations import AT_LIMITS, OUTSIDE, situation_of
 from dikbench.report.selection.stored_motions import (
     in_panels,
     points_per_curve,
@@ -21,17 +21,13 @@ from dikbench.report.selection.stored_motions import (
     thinned,
 )
 from dikbench.results.folder import ResultsFolder
-from dikbench.selector import parse_selector
-
-FAMILIES: Final = ("joint-limit-crossing", "joint-limit-approach", "start-outside", "hexagon")
-"""Families about position limits, the most telling first."""
 
 
 def draw_joint_margins(
     folder: ResultsFolder, ran: pd.DataFrame, example: str, target: Path
 ) -> list[Figure]:
     """Draw the margins of the study's example, or of the first scenario that is about them."""
-    scenario = _about_limits([example, *dict.fromkeys(ran["scenario"])])
+    scenario = _about_limits(example, ran)
     if scenario is None:
         return []
     motions = stored_motions(folder, ran, scenario)
@@ -89,12 +85,16 @@ def joint_margin(motion: Motion) -> Array:
     return margin
 
 
-def _about_limits(scenarios: list[str]) -> str | None:
-    """The first of them if it is of a family about limits, else the first of the first family."""
-    families = {scenario: parse_selector(scenario).name for scenario in scenarios}
-    if families[scenarios[0]] in FAMILIES:
-        return scenarios[0]
-    ranked = [
-        (FAMILIES.index(f), n, s) for n, (s, f) in enumerate(families.items()) if f in FAMILIES
+def _about_limits(example: str, ran: pd.DataFrame) -> str | None:
+    """Choose a scenario whose exact motion comes near a position limit, the example if it does.
+
+    Args:
+        example: the study's example.
+        ran: trials.
+    """
+    seeds = ran.drop_duplicates("scenario").set_index("scenario")["seed"]
+    candidates = [
+        scenario for scenario in dict.fromkeys([example, *seeds.index]) if scenario in seeds
     ]
-    return min(ranked)[2] if ranked else None
+    near = (s for s in candidates if situation_of(s, int(seeds[s])) in (AT_LIMITS, OUTSIDE))
+    return next(near, None)

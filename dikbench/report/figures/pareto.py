@@ -16,14 +16,15 @@ from dikbench.report.drawing.style import COLOURS, WIDTH, save, short
 from dikbench.report.selection.rows import how
 
 DIGITS: Final = 3
-"""After the point, of deg and %; beyond these a law is not better, it is rounded otherwise."""
+"""After the point, of deg and %; beyond these a formulation is not better, it is rounded
+otherwise."""
 
 
 def draw_off_course_and_slow_down(ran: pd.DataFrame, target: Path) -> list[Figure]:
-    """Draw a point per law and the laws that none beats in both, for each plant."""
+    """Draw a point per formulation and the formulations that none beats in both, for each plant."""
     ways = ran.groupby(["plant", "reference"], sort=False)
     parts = [rows for _, rows in ways if rows["status"].eq("ok").any()]
-    tables = {how(rows): table for rows in parts if len(table := law_points(rows))}
+    tables = {how(rows): table for rows in parts if len(table := contender_points(rows))}
     if not tables:
         return []
     height = 3.5 if len(tables) <= 2 else 2.8
@@ -54,7 +55,7 @@ def draw_off_course_and_slow_down(ran: pd.DataFrame, target: Path) -> list[Figur
     return [Figure(file, caption, "Off course against slow-down")]
 
 
-def law_points(rows: pd.DataFrame) -> pd.DataFrame:
+def contender_points(rows: pd.DataFrame) -> pd.DataFrame:
     """The means of each formulation: `off_course` [deg], `slow_down` [%], and `violating`."""
     ended = rows["status"].eq("ok")
     off_course = np.degrees(rows["off_course_max_rad"]).where(ended, 180.0)
@@ -67,9 +68,9 @@ def law_points(rows: pd.DataFrame) -> pd.DataFrame:
             "violating": rows["violating_share"].gt(0.0),
         }
     )
-    by_law = table.groupby("formulation", sort=False)
-    means = by_law[["off_course", "slow_down"]].mean()
-    return means.assign(violating=by_law["violating"].any()).dropna()
+    by_formulation = table.groupby("formulation", sort=False)
+    means = by_formulation[["off_course", "slow_down"]].mean()
+    return means.assign(violating=by_formulation["violating"].any()).dropna()
 
 
 def front(points: Array) -> Mask:

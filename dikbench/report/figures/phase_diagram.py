@@ -1,4 +1,4 @@
-"""The phase diagram: what each law makes of near misses, over miss distance and speed."""
+"""The phase diagram: what each formulation makes of near misses, over miss distance and speed."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ from dikbench.arrays import Array, Mask
 from dikbench.report.drawing.figure import Figure
 from dikbench.report.drawing.panels import place_at_top, small_multiples
 from dikbench.report.drawing.style import label_decades, save
+from dikbench.report.selection.categories import CATEGORIES, OFF_COURSE, SLOW, categories
 from dikbench.report.selection.near_miss_grids import NearMissGrid, near_miss_grids
-from dikbench.report.selection.outcomes import OFF_COURSE, OUTCOMES, SLOW, outcomes
-from dikbench.report.selection.rows import error_column, how, pages, with_failures
+from dikbench.report.selection.rows import error_column, failures_at_infinity, how, pages
 from dikbench.scenario.oracle import ORACLE
 
 PER_PAGE = 20
-"""Laws in one figure."""
+"""Formulations in one figure."""
 
 GAP = 0.18
 """Between the column of miss = 0, which is a case of its own, and the others [cells]."""
 
 FAILED = "#222222"
 
-OUTCOME_COLOURS = ("#e8f1e4", "#56B4E9", "#E69F00", "#D55E00", FAILED)
-OUTCOME_MARKS = ("", "s", "o", "v", "x")
+CATEGORY_COLOURS = ("#e8f1e4", "#56B4E9", "#E69F00", "#D55E00", FAILED)
+CATEGORY_MARKS = ("", "s", "o", "v", "x")
 
 
 @dataclass(frozen=True, eq=False)
 class _Map:
-    """A quantity over a grid: its values per law, how they are coloured and written.
+    """A quantity over a grid: its values per formulation, how they are coloured and written.
 
     Without the label of a colour bar it is of categories.
     """
@@ -55,31 +55,33 @@ class _Map:
 def draw_phase_diagrams(ran: pd.DataFrame, target: Path) -> list[Figure]:
     """Draw, for each grid of near misses, the error, the peak speed and the outcome per law."""
     figures = []
-    for number, grid in enumerate(near_miss_grids(ran.assign(outcome=outcomes(ran))), start=1):
+    for number, grid in enumerate(near_miss_grids(ran.assign(outcome=categories(ran))), start=1):
         maps = [m for m in _maps(grid) if any(np.isfinite(v).any() for v in m.values.values())]
-        parts = pages(_laws_in_order(grid.rows), PER_PAGE)
+        parts = pages(_formulations_in_order(grid.rows), PER_PAGE)
         for one in maps:
-            for page, laws in enumerate(parts, start=1):
+            for page, formulations in enumerate(parts, start=1):
                 file = f"phase_diagram_{number}_{one.name}" + (f"_{page}" * (len(parts) > 1))
                 of = f" (part {page} of {len(parts)})" if len(parts) > 1 else ""
                 caption = (
                     f"{one.explained} Near misses ({grid.others or 'defaults'}), {how(grid.rows)}, "
                     "a panel per law: the oracle, which moves along the path as asked for, then "
-                    f"from the best law to the worst{of}. Black: the trial failed."
+                    f"from the best formulation to the worst{of}. Black: the trial failed."
                 )
                 title = (
                     f"Phase diagram of near misses, {grid.others or 'defaults'}: {one.title}{of}"
                 )
-                figures.append(Figure(_draw(grid, laws, one, target, file), caption, title))
+                figures.append(Figure(_draw(grid, formulations, one, target, file), caption, title))
     return figures
 
 
-def _laws_in_order(rows: pd.DataFrame) -> list[str]:
+def _formulations_in_order(rows: pd.DataFrame) -> list[str]:
     """The oracle first, then by the mean outcome, then by the median error."""
     column, _ = error_column(rows)
-    worth = rows.assign(error=with_failures(rows, column))
-    by_law = worth.groupby("formulation", sort=False)
-    table = pd.DataFrame({"outcome": by_law["outcome"].mean(), "error": by_law["error"].median()})
+    worth = rows.assign(error=failures_at_infinity(rows, column))
+    by_formulation = worth.groupby("formulation", sort=False)
+    table = pd.DataFrame(
+        {"outcome": by_formulation["outcome"].mean(), "error": by_formulation["error"].median()}
+    )
     order = table.sort_values(["outcome", "error"], kind="stable").index
     return sorted(order, key=lambda name: name != ORACLE)
 
@@ -123,9 +125,9 @@ def _maps(grid: NearMissGrid) -> list[_Map]:
             f"direction at some step); else slow (less than {100 * SLOW:.0f} % of the wanted "
             "motion at some step); else ok.",
             shown.values("outcome", "max"),
-            ListedColormap(list(OUTCOME_COLOURS)),
-            BoundaryNorm(np.arange(-0.5, len(OUTCOMES)), len(OUTCOMES)),
-            lambda value: OUTCOME_MARKS[round(value)],
+            ListedColormap(list(CATEGORY_COLOURS)),
+            BoundaryNorm(np.arange(-0.5, len(CATEGORIES)), len(CATEGORIES)),
+            lambda value: CATEGORY_MARKS[round(value)],
         ),
     ]
 
@@ -139,24 +141,26 @@ def _log_norm(values: Mapping[str, Array], low: float, high: float, least: float
     return LogNorm(bottom, top)
 
 
-def _draw(grid: NearMissGrid, laws: Sequence[str], one: _Map, target: Path, file: str) -> str:
+def _draw(
+    grid: NearMissGrid, formulations: Sequence[str], one: _Map, target: Path, file: str
+) -> str:
     edges, centres = _columns(grid.misses)
     rows = len(grid.speeds)
     figure, axes = small_multiples(
-        laws,
+        formulations,
         0.2 * max(rows, 3),
         "miss distance [m; rad]",
         "speed [rad/s; m/s]",
         top=0.68 if one.bar else 0.5,
     )
     outcome = grid.values("outcome", "max")
-    for axis, law in zip(axes, laws, strict=True):
+    for axis, formulation in zip(axes, formulations, strict=True):
         axis.grid(visible=False)
         axis.set_facecolor("white")
         for side in ("left", "bottom"):
             axis.spines[side].set_visible(False)
-        values = one.values[law]
-        failed = np.isnan(values) & (outcome[law] == OUTCOMES.index("failed"))
+        values = one.values[formulation]
+        failed = np.isnan(values) & (outcome[formulation] == CATEGORIES.index("failed"))
         _cells(axis, edges, values, one.colours, one.norm)
         if failed.any():
             _cells(axis, edges, np.where(failed, 1.0, np.nan), ListedColormap([FAILED]))
@@ -203,7 +207,7 @@ def _cells(
 def _write(axis: Any, centres: Array, one: _Map, values: Array, failed: Mask) -> None:
     for (row, column), value in np.ndenumerate(values):
         if failed[row, column]:
-            text, colour = OUTCOME_MARKS[-1], "white"
+            text, colour = CATEGORY_MARKS[-1], "white"
         elif np.isfinite(value):
             text, colour = one.text(value), _readable_on(one.colours(one.norm(value)))
         else:
@@ -234,11 +238,11 @@ def _key(figure: Any, one: _Map) -> None:
     if not one.bar:
         names = [
             f"{name} ({mark})" if mark else name
-            for name, mark in zip(OUTCOMES, OUTCOME_MARKS, strict=True)
+            for name, mark in zip(CATEGORIES, CATEGORY_MARKS, strict=True)
         ]
         handles = [
             Patch(facecolor=colour, edgecolor="0.6", linewidth=0.4, label=name)
-            for colour, name in zip(OUTCOME_COLOURS, names, strict=True)
+            for colour, name in zip(CATEGORY_COLOURS, names, strict=True)
         ]
         figure.legend(handles=handles, loc="upper center", ncols=len(handles))
         return

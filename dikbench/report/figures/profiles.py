@@ -19,17 +19,17 @@ from dikbench.scenario.oracle import ORACLE
 from dikbench.statistics.data_profile import data_profile
 from dikbench.statistics.failures import has_failed, ran
 from dikbench.statistics.performance_profile import area, performance_ratios, profile
-from dikbench.statistics.problems import ProblemMatrix
+from dikbench.statistics.trial_matrix import TrialMatrix
 
 NAMED = 8
-"""Laws that are named in a picture; the others are grey."""
+"""Formulations that are named in a picture; the others are grey."""
 
 PAIRS = 6
-"""Laws that are compared with the first one alone."""
+"""Formulations that are compared with the first one alone."""
 
 DONE = 0.95
-"""A law that leaves more of the path than this undone has not solved the problem: to stand still on
-the path is no way to follow it."""
+"""A formulation that leaves more of the path than this undone has not solved the problem: to stand
+still on the path is no way to follow it."""
 
 LARGEST = 1e3
 """Ratio at which performance profiles end."""
@@ -44,14 +44,14 @@ STEPS = {"drawstyle": "steps-post"}
 def draw_profiles(trials: pd.DataFrame, target: Path) -> list[Figure]:
     """Draw performance profiles for each plant and reference mode, and the data profiles of all.
 
-    Each law is drawn with the first of its solvers; the oracle is none.
+    Each formulation is drawn with the first of its solvers; the oracle is none.
 
     Args:
         trials: the rows of trials.csv, skipped and failed ones too.
         target: the folder of figures.
     """
-    laws = one_solver_each(ran(trials[trials["formulation"] != ORACLE]))
-    ways = [(how(rows), rows) for _, rows in laws.groupby(["plant", "reference"], sort=False)]
+    contenders = one_solver_each(ran(trials[trials["formulation"] != ORACLE]))
+    ways = [(how(rows), rows) for _, rows in contenders.groupby(["plant", "reference"], sort=False)]
     figures: list[Figure] = []
     for name, rows in ways:
         costs = Costs.of(rows, "rms", late=bool(rows["reference"].eq("time").all()))
@@ -65,17 +65,17 @@ def draw_profiles(trials: pd.DataFrame, target: Path) -> list[Figure]:
 
 @dataclass(frozen=True, eq=False)
 class Costs:
-    """The errors of laws on the same problems.
+    """The errors of formulations on the same problems.
 
     Attributes:
-        laws: names.
-        errors: (problems, laws) [m], at least `LEAST_ERROR`; infinite where a law did not solve
-            a problem: it failed, or was skipped.
+        formulations: names.
+        errors: (problems, formulations) [m], at least `LEAST_ERROR`; infinite where a formulation
+            did not solve a problem: it failed, or was skipped.
         words: what the errors are.
         undone: what else counts as not solved, in words.
     """
 
-    laws: list[str]
+    contenders: list[str]
     errors: Array
     words: str
     undone: str
@@ -99,22 +99,24 @@ class Costs:
             f"{'rms' if kind == 'rms' else 'largest'} {'contour' if is_there else 'position'} error"
         )
         recorded = rows[column].to_numpy(dtype=float)
-        layout = ProblemMatrix.of(rows)
+        layout = TrialMatrix.of(rows)
         failed = has_failed(rows)
         if is_there and "path_done_share" in rows:
             failed = failed | rows["path_done_share"].lt(DONE).to_numpy()
         errors = layout.fill(np.where(failed, np.nan, np.maximum(recorded, LEAST_ERROR)))
-        # A problem that laws went through without an error to measure (no path) is none.
+        # A problem that formulations went through without an error to measure (no path) is none.
         went_through = layout.fill(np.where(failed, 0.0, 1.0), 0.0).any(axis=1)
         defined = ~np.isnan(errors).all(axis=1) | ~went_through
         solved = np.where(np.isnan(errors), np.inf, errors)[defined]
         undone = f", and those that left more than {1 - DONE:.0%} of the path undone,"
-        return cls(list(layout.laws["formulation"]), solved, words, undone if is_there else "")
+        return cls(
+            list(layout.contenders["formulation"]), solved, words, undone if is_there else ""
+        )
 
     @property
     def comparable(self) -> bool:
-        """Whether there are two laws, and a problem that one of them solved."""
-        return len(self.laws) > 1 and bool(np.isfinite(self.errors).any())
+        """Whether there are two formulations, and a problem that one of them solved."""
+        return len(self.contenders) > 1 and bool(np.isfinite(self.errors).any())
 
 
 def _performance(costs: Costs, name: str, target: Path, file: str) -> Figure:
@@ -125,8 +127,8 @@ def _performance(costs: Costs, name: str, target: Path, file: str) -> Figure:
     figure = plt.figure(figsize=(WIDTH, 3.6))
     places = figure.add_gridspec(2, 5)
     whole = figure.add_subplot(places[:, :2])
-    _curves(whole, costs.laws, order, FACTORS, profile(ratios, FACTORS))
-    whole.set_title("all laws")
+    _curves(whole, costs.contenders, order, FACTORS, profile(ratios, FACTORS))
+    whole.set_title("all formulations")
     whole.set_ylabel("share of the problems")
     for place, (second, axis) in enumerate(zip(others, _small(figure, places), strict=False)):
         pair = [first, second]
@@ -134,31 +136,33 @@ def _performance(costs: Costs, name: str, target: Path, file: str) -> Figure:
         for column, number in enumerate((0, place + 1)):
             axis.plot(FACTORS, shares[:, column], **{**look(number), **STEPS, "linewidth": 1.3})
         _factor_axis(axis)
-        axis.set_title(short(costs.laws[second], 18))
+        axis.set_title(short(costs.contenders[second], 18))
         axis.tick_params(labelleft=place % 3 == 0, labelbottom=place >= len(others) - 3)
     _factor_axis(whole)
-    figure.supxlabel(f"{costs.words} over the smallest of the laws in the picture", fontsize=8)
+    figure.supxlabel(
+        f"{costs.words} over the smallest of the formulations in the picture", fontsize=8
+    )
     figure.legend(*whole.get_legend_handles_labels(), loc="outside upper center", ncols=4)
     caption = (
         f"Performance profiles, {name}: the share of the {len(ratios)} problems (scenarios and "
         f"seeds) on which the {costs.words} of a law is within a factor of the smallest; errors "
         f"below {LEAST_ERROR:g} m count as equal, failed and skipped trials{costs.undone} as not "
         f"solved. The laws are ordered by the area under their curves{_left_over(order)}. Of many "
-        "laws a profile ranks the first one only: at the right "
-        f"{costs.laws[first]} with each of the next laws alone, whose name stands above."
+        "formulations a profile ranks the first one only: at the right "
+        f"{costs.contenders[first]} with each of the next laws alone, whose name stands above."
         f"{_flip(costs, order)}"
     )
     return Figure(save(figure, target, file), caption, f"Performance profiles, {name}")
 
 
 def _data(errors: dict[str, Costs], target: Path) -> Figure:
-    """A panel per plant and reference mode; a law looks the same in all."""
+    """A panel per plant and reference mode; a formulation looks the same in all."""
     heights: dict[str, list[float]] = {}
     shares = {name: data_profile(costs.errors, TARGETS) for name, costs in errors.items()}
     for name, costs in errors.items():
-        for law, height in zip(costs.laws, shares[name].mean(axis=0), strict=True):
-            heights.setdefault(law, []).append(float(height))
-    ranked = sorted(heights, key=lambda law: -float(np.mean(heights[law])))
+        for contender, height in zip(costs.contenders, shares[name].mean(axis=0), strict=True):
+            heights.setdefault(contender, []).append(float(height))
+    ranked = sorted(heights, key=lambda contender: -float(np.mean(heights[contender])))
     rows = -(-len(errors) // 2)
     figure, axes = plt.subplots(
         rows, min(len(errors), 2), figsize=(WIDTH, 0.6 + 2.4 * rows), squeeze=False, sharey=True
@@ -166,8 +170,11 @@ def _data(errors: dict[str, Costs], target: Path) -> Figure:
     for axis in axes.flat[len(errors) :]:
         axis.set_visible(False)
     for axis, (name, costs) in zip(axes.flat, errors.items(), strict=False):
-        order = [costs.laws.index(law) if law in costs.laws else -1 for law in ranked]
-        _curves(axis, costs.laws, order, TARGETS, shares[name])
+        order = [
+            costs.contenders.index(contender) if contender in costs.contenders else -1
+            for contender in ranked
+        ]
+        _curves(axis, costs.contenders, order, TARGETS, shares[name])
         axis.set_xlim(TARGETS[0], TARGETS[-1])
         logarithmic(axis, "x")
         axis.set_ylim(-0.02, 1.02)
@@ -187,15 +194,17 @@ def _data(errors: dict[str, Costs], target: Path) -> Figure:
     return Figure(save(figure, target, "data_profiles"), caption, "Data profiles")
 
 
-def _curves(axis: Any, laws: list[str], order: list[int], x: Array, shares: Array) -> None:
+def _curves(axis: Any, contenders: list[str], order: list[int], x: Array, shares: Array) -> None:
     """Draw the curves of laws in an order, the first ones named; a law of -1 is not there."""
-    for number, law in enumerate(order):
-        if law < 0:
+    for number, contender in enumerate(order):
+        if contender < 0:
             continue
         if number < NAMED:
-            axis.plot(x, shares[:, law], label=short(laws[law]), **look(number), **STEPS)
+            axis.plot(
+                x, shares[:, contender], label=short(contenders[contender]), **look(number), **STEPS
+            )
         else:
-            axis.plot(x, shares[:, law], **GREY, **STEPS)
+            axis.plot(x, shares[:, contender], **GREY, **STEPS)
 
 
 def _small(figure: Any, places: Any) -> Iterator[Any]:
@@ -212,8 +221,8 @@ def _factor_axis(axis: Any) -> None:
 
 
 def _order(ratios: Array) -> list[int]:
-    """Laws by the area under their profile, the largest first."""
-    return [int(law) for law in np.argsort(-area(ratios, LARGEST), kind="stable")]
+    """Formulations by the area under their profile, the largest first."""
+    return [int(contender) for contender in np.argsort(-area(ratios, LARGEST), kind="stable")]
 
 
 def _left_over(order: list[Any]) -> str:
@@ -221,14 +230,17 @@ def _left_over(order: list[Any]) -> str:
 
 
 def _flip(costs: Costs, order: list[int]) -> str:
-    """A sentence where two named laws change places when the first one is taken out."""
+    """A sentence where two named formulations change places when the first one is taken out."""
     others = order[1:NAMED]
-    kept = [order[1:][law] for law in _order(performance_ratios(costs.errors[:, order[1:]]))]
-    without = [law for law in kept if law in others]
+    kept = [
+        order[1:][contender] for contender in _order(performance_ratios(costs.errors[:, order[1:]]))
+    ]
+    without = [contender for contender in kept if contender in others]
     for before, after in zip(others, without, strict=True):
         if before != after:
             return (
-                f" Without {costs.laws[order[0]]} the order changes: {costs.laws[after]} comes "
-                f"before {costs.laws[before]}."
+                f" Without {costs.contenders[order[0]]} the order changes: "
+                f"{costs.contenders[after]} comes "
+                f"before {costs.contenders[before]}."
             )
     return ""

@@ -1,4 +1,4 @@
-"""Error and peak speed against a swept parameter: a panel for each law."""
+"""Error and peak speed against a swept parameter: a panel for each formulation."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from dikbench.report.selection.rows import LEAST_ERROR, error_column, how, pages
 from dikbench.report.selection.sweeps import Sweep, number, sweeps
 
 PER_PAGE = 24
-"""Laws in one figure."""
+"""Formulations in one figure."""
 
 MOST_CURVES = 5
 """In a panel: of more values of the second parameter, so many are drawn, spread over all."""
@@ -61,13 +61,13 @@ def draw_sweeps(ran: pd.DataFrame, target: Path) -> list[Figure]:
             if not sweep.rows[quantity.column].where(sweep.rows["status"].eq("ok")).notna().any():
                 continue
             parts = pages(ranked(sweep.rows, column), PER_PAGE)
-            for page, laws in enumerate(parts, start=1):
+            for page, formulations in enumerate(parts, start=1):
                 file = file_name(
                     quantity.name, "against", sweep.parameter, place, *[page] * (len(parts) > 1)
                 )
                 figures.append(
                     Figure(
-                        _draw(sweep, quantity, laws, target, file),
+                        _draw(sweep, quantity, formulations, target, file),
                         _caption(sweep, quantity),
                         f"{quantity.label} against {sweep.parameter}: {sweep.family}",
                     )
@@ -79,7 +79,7 @@ def _caption(sweep: Sweep, quantity: _Quantity) -> str:
     curves = (
         f"a curve for each {sweep.second}"
         if sweep.second
-        else "in grey the median law and the middle half of all laws"
+        else "in grey the median formulation and the middle half of all formulations"
     )
     return (
         f"{quantity.label[0].upper()}{quantity.label[1:]} against {sweep.parameter} of "
@@ -88,19 +88,23 @@ def _caption(sweep: Sweep, quantity: _Quantity) -> str:
     )
 
 
-def _draw(sweep: Sweep, quantity: _Quantity, laws: Sequence[str], target: Path, file: str) -> str:
+def _draw(
+    sweep: Sweep, quantity: _Quantity, formulations: Sequence[str], target: Path, file: str
+) -> str:
     scale = ValueScale(sweep.rows["value"])
     table = _table(sweep, quantity)
     x_label = f"{sweep.parameter}{UNITS.get(sweep.parameter, '')}"
     figure, axes = small_multiples(
-        laws, 0.85, x_label, quantity.label, top=0.62 if sweep.second else 0.22
+        formulations, 0.85, x_label, quantity.label, top=0.62 if sweep.second else 0.22
     )
-    for axis, law in zip(axes, laws, strict=True):
+    for axis, formulation in zip(axes, formulations, strict=True):
         if not sweep.second:
             _others(axis, scale, table["worth"])
-        of_law = table.loc[law]
+        of_formulation = table.loc[formulation]
         for second, colour in _curves(list(dict.fromkeys(sweep.rows["second"]))):
-            curve = of_law[of_law.index.get_level_values("second") == second].droplevel("second")
+            curve = of_formulation[
+                of_formulation.index.get_level_values("second") == second
+            ].droplevel("second")
             axis.plot(
                 *scale.curve(curve.index.to_numpy(), curve["worth"].to_numpy()), "o-",
                 color=colour, markersize=2.5, linewidth=1.1, label=short(second),
@@ -157,7 +161,7 @@ def _curves(seconds: Sequence[str]) -> list[tuple[str, Any]]:
 
 
 def _others(axis: Any, scale: ValueScale, table: pd.Series) -> None:
-    """The median law and the middle half of all laws, in grey."""
+    """The median formulation and the middle half of all formulations, in grey."""
     quartiles = table.groupby("value").quantile(np.array([0.25, 0.5, 0.75])).unstack().sort_index()
     values = quartiles.index.to_numpy()
     places, middle = scale.curve(values, quartiles[0.5].to_numpy())

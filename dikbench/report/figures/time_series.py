@@ -32,7 +32,7 @@ LEAST = {POSITION: 1e3 * LEAST_ERROR, CONTOUR: 1e3 * LEAST_ERROR, SPEED: 1e-2}
 def draw_time_series(
     folder: ResultsFolder, ran: pd.DataFrame, scenario: str, target: Path
 ) -> list[Figure]:
-    """Draw the stored traces of one scenario, a row of panels for every few laws."""
+    """Draw the stored traces of one scenario, a row of panels for every few formulations."""
     motions = stored_motions(folder, ran, scenario)
     if not motions:
         return []
@@ -71,7 +71,7 @@ def draw_time_series(
 
 
 def _columns(motions: Mapping[str, Motion]) -> dict[str, dict[str, Array]]:
-    """What is drawn, with its label: the values of each law."""
+    """What is drawn, with its label: the values of each formulation."""
     columns = {
         POSITION: {name: 1e3 * motion.position_error for name, motion in motions.items()},
         CONTOUR: {name: 1e3 * motion.contour_error for name, motion in motions.items()},

@@ -1,4 +1,4 @@
-"""Where the time of a control step goes, per law and solver."""
+"""Where the time of a control step goes, per formulation and solver."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from dikbench.report.drawing.style import COLOURS, WIDTH, save, short
 PARTS: Final = MappingProxyType(
     {
         "kinematics_time_median_us": ("kinematics and tasks", "0.75"),
-        "law_own_time_median_us": ("law", COLOURS[0]),
+        "formulation_own_time_median_us": ("contender", COLOURS[0]),
         "solver_core_time_median_us": ("solver: the library's call", COLOURS[1]),
         "solver_wrapper_time_median_us": ("solver: what wraps it", COLOURS[5]),
     }
 )
 """Columns of the parts of a step, with name and colour."""
 
-P99: Final = "law_time_p99_us"
+P99: Final = "formulation_time_p99_us"
 
 WITHIN: Final = 8.0
 """Bars that differ by more than this factor do not share an axis: the short ones would vanish."""
@@ -33,7 +33,7 @@ BEYOND: Final = 2.0
 
 
 def draw_time_split(ran: pd.DataFrame, target: Path) -> list[Figure]:
-    """Draw a stacked bar per law and solver, the fast ones above on an axis of their own."""
+    """Draw a stacked bar per formulation and solver, the fast ones on an axis of their own."""
     table = time_parts(ran)
     if table.empty:
         return []
@@ -58,14 +58,16 @@ def draw_time_split(ran: pd.DataFrame, target: Path) -> list[Figure]:
         "is far out. Each block has an axis of its own. Compare ratios: absolute times belong to "
         "the machine in the manifest."
     )
-    file = save(figure, target, "time_per_law_and_solver")
-    return [Figure(file, caption, "Time of one control step, per law and solver")]
+    file = save(figure, target, "time_per_formulation_and_solver")
+    return [Figure(file, caption, "Time of one control step, per formulation and solver")]
 
 
 def time_parts(ran: pd.DataFrame) -> pd.DataFrame:
-    """Medians over the timed scenarios of each law and solver [us], fast ones first."""
-    timed = ran[ran["law_time_median_us"].notna()].drop_duplicates(["law", "scenario"])
-    medians = timed.groupby("law", sort=False)[[*PARTS, P99]].median()
+    """Medians over the timed scenarios of each formulation and solver [us], fast ones first."""
+    timed = ran[ran["formulation_time_median_us"].notna()].drop_duplicates(
+        ["contender", "scenario"]
+    )
+    medians = timed.groupby("contender", sort=False)[[*PARTS, P99]].median()
     totals = medians[list(PARTS)].sum(axis=1)
     return medians.loc[totals[totals > 0].sort_values(kind="stable").index]
 
@@ -96,7 +98,7 @@ def _bars(axis: Any, group: pd.DataFrame) -> None:
     for end, place in zip(ends[~drawn], places[~drawn], strict=True):
         if np.isfinite(end):
             axis.text(limit * 1.02, place, f"{end:.0f}", ha="left", va="center", fontsize=6)
-    axis.set_yticks(places, [short(str(law), 30) for law in group.index])
+    axis.set_yticks(places, [short(str(contender), 30) for contender in group.index])
     axis.set_ylim(-0.6, len(group) - 0.4)
     axis.set_xlim(0.0, 1.08 * limit)
     axis.grid(visible=False, axis="y")

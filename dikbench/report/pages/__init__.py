@@ -1,1 +1,1 @@
-"""The pages of a report, HTML and Markdown, and what they say of laws and families."""
+"""The pages of a report, HTML and Markdown, and what they say of formulations and families."""

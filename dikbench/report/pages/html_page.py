@@ -18,7 +18,7 @@ from markupsafe import Markup
 from dikbench.report.contents.contents import Contents
 from dikbench.report.drawing.figure import Figure
 from dikbench.report.pages.backticks import to_html
-from dikbench.report.tables.table import Cell, Column, shown
+from dikbench.report.tables.table import Column, TableCell, shown
 
 SECTIONS: Final = (
     ("summary", "Summary"),
@@ -26,7 +26,7 @@ SECTIONS: Final = (
     ("return-codes", "Return codes"),
     ("figures", "Figures"),
     ("families", "Families"),
-    ("laws", "Laws"),
+    ("formulations", "Formulations"),
     ("limitations", "Limitations"),
     ("made", "How it was made"),
 )
@@ -105,7 +105,7 @@ def render_html(contents: Contents, figures: Path) -> str:
     return template.render(figures=_inlined(contents.figures, figures, room), **given)
 
 
-def _td(cell: Cell, column: Column) -> Markup:
+def _td(cell: TableCell, column: Column) -> Markup:
     """A number in its cell; it is sorted by `data-sort` where its text is more than the number."""
     if isnan(cell.value):
         return Markup("<td></td>")

@@ -18,7 +18,7 @@ FAMILY = "near-miss"
 
 @dataclass(frozen=True, eq=False)
 class NearMissGrid:
-    """Trials of near misses that differ in miss distance, speed and law.
+    """Trials of near misses that differ in miss distance, speed and formulation.
 
     Attributes:
         others: the other parameters of the scenarios, as in a selector.

@@ -1,4 +1,4 @@
-"""Which rows of a table of trials are drawn, and in which order laws stand."""
+"""Which rows of a table of trials are drawn, and in which order formulations stand."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from dikbench.report.drawing.style import law_name
+from dikbench.report.drawing.style import contender_name
 from dikbench.scenario.oracle import ORACLE
 
 LEAST_ERROR = 1e-5
@@ -15,13 +15,15 @@ LEAST_ERROR = 1e-5
 
 
 def that_ran(trials: pd.DataFrame) -> pd.DataFrame:
-    """The trials that took a step, with a column `law` that names law and solver.
+    """The trials that took a step, with a column `formulation` that names formulation and solver.
 
     Infinite numbers, which have no place on an axis, are missing ones here.
     """
     ran = trials[trials["status"].ne("skipped") & trials["steps"].gt(0)]
     ran = ran.replace([np.inf, -np.inf], np.nan)
-    ran["law"] = [law_name(f, s) for f, s in zip(ran["formulation"], ran["solver"], strict=True)]
+    ran["contender"] = [
+        contender_name(f, s) for f, s in zip(ran["formulation"], ran["solver"], strict=True)
+    ]
     return ran
 
 
@@ -49,15 +51,15 @@ def how(rows: pd.DataFrame) -> str:
 def error_column(ran: pd.DataFrame) -> tuple[str, str]:
     """The column that says how far a motion was from its path, and what it is called.
 
-    The distance from the path where it was measured, else from the target: of that a law that
-    slows down has a large one by design.
+    The distance from the path where it was measured, else from the target: of that a formulation
+    that slows down has a large one by design.
     """
     if "contour_error_rms_m" in ran and ran["contour_error_rms_m"].notna().any():
         return "contour_error_rms_m", "contour error"
     return "position_error_rms_m", "position error"
 
 
-def with_failures(rows: pd.DataFrame, column: str) -> pd.Series:
+def failures_at_infinity(rows: pd.DataFrame, column: str) -> pd.Series:
     """A column of which less is better; infinite where the trial did not end well."""
     return rows[column].where(rows["status"].eq("ok"), np.inf)
 
@@ -69,7 +71,7 @@ def ranked(rows: pd.DataFrame, column: str) -> list[str]:
         rows: of trials.
         column: of which less is better.
     """
-    worth = rows.assign(worth=with_failures(rows, column))
+    worth = rows.assign(worth=failures_at_infinity(rows, column))
     medians = worth.groupby("formulation", sort=False)["worth"].median()
     order = medians.sort_values(kind="stable", na_position="last").index
     return sorted(order, key=lambda name: name != ORACLE)

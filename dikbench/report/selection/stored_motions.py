@@ -26,7 +26,7 @@ ALL_POINTS: Final = 9000
 
 
 def stored_motions(folder: ResultsFolder, ran: pd.DataFrame, scenario: str) -> dict[str, Motion]:
-    """The motions of one scenario whose traces are stored, per formulation, the best law first.
+    """The motions of one scenario whose traces are stored, per law, the best law first.
 
     One plant and one reference mode, the first seed.
     """

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import pandas as pd
 
 from dikbench.report.selection.rows import one_way
-from dikbench.selector import parse_selector
+from dikbench.results.selected import parameters_of
+from dikbench.selector import listed
 
 FEWEST = 3
 """Fewer values than this are no sweep."""
@@ -21,7 +23,7 @@ class Sweep:
     Attributes:
         family: of the scenarios.
         parameter: what is swept.
-        second: the parameter that tells several sweeps apart; empty where there is one.
+        second: the parameter that distinguishes several sweeps; empty where there is one.
         others: the other parameters, as in a selector.
         rows: their trials, with columns `value` and `second`, a text.
     """
@@ -40,10 +42,11 @@ Place = tuple[float, str]
 def sweeps(trials: pd.DataFrame) -> list[Sweep]:
     """Find every sweep with at least three values; what crosses another one is shown once."""
     chosen = one_way(trials)
-    scenarios = {name: parse_selector(name) for name in dict.fromkeys(chosen["scenario"])}
-    families: dict[str, dict[str, Mapping[str, str]]] = {}
-    for name, selector in scenarios.items():
-        families.setdefault(selector.name, {})[name] = selector.parameters
+    parameters = parameters_of(chosen, "scenario")
+    family_of = dict(zip(chosen["scenario"], chosen["scenario_family"], strict=True))
+    families: dict[str, dict[str, Mapping[str, Any]]] = {}
+    for name, family in family_of.items():
+        families.setdefault(family, {})[name] = parameters[name]
     found: list[Sweep] = []
     for family, members in families.items():
         shown: set[str] = set()
@@ -59,7 +62,7 @@ def sweeps(trials: pd.DataFrame) -> list[Sweep]:
 
 
 def _longest_first(
-    members: Mapping[str, Mapping[str, str]],
+    members: Mapping[str, Mapping[str, Any]],
 ) -> list[tuple[str, str, str, dict[str, Place]]]:
     """The sweeps in the scenarios of a family, those over more scenarios and values first."""
     keys = list(dict.fromkeys(key for parameters in members.values() for key in parameters))
@@ -76,16 +79,16 @@ def _longest_first(
 
 
 def _groups(
-    members: Mapping[str, Mapping[str, str]], parameter: str, second: str
+    members: Mapping[str, Mapping[str, Any]], parameter: str, second: str
 ) -> dict[str, dict[str, Place]]:
     """Scenarios that share all parameters but one or two, with the values of these."""
     groups: dict[str, dict[str, Place]] = {}
     for name, parameters in members.items():
-        value = number(parameters.get(parameter, ""))
+        value = number(parameters.get(parameter))
         other = parameters.get(second) if second else ""
         if value is not None and other is not None:
-            rest = (f"{k}={v}" for k, v in parameters.items() if k not in {parameter, second})
-            groups.setdefault(",".join(rest), {})[name] = (value, other)
+            rest = {k: v for k, v in parameters.items() if k not in {parameter, second}}
+            groups.setdefault(listed(rest), {})[name] = (value, str(other))
     return groups
 
 
@@ -97,10 +100,10 @@ def _is_sweep(places: Mapping[str, Place], second: str) -> bool:
     return min(map(len, values.values())) >= FEWEST and (len(values) > 1 or not second)
 
 
-def number(text: str) -> float | None:
-    """The finite number that a parameter is, if it is one."""
+def number(value: Any) -> float | None:
+    """Return the finite number that a parameter is, if it is one."""
     try:
-        value = float(text)
-    except ValueError:
+        found = float(value)
+    except (TypeError, ValueError):
         return None
-    return value if abs(value) < float("inf") else None
+    return found if abs(found) < float("inf") else None

@@ -10,9 +10,9 @@ from typing import Final
 import pandas as pd
 
 from dikbench.metrics.metric import NEGLIGIBLE
-from dikbench.report.sentences.comparison import SAME, Lead, lead
+from dikbench.report.sentences.paired_wins import SAME, Lead, lead
 from dikbench.report.sentences.words import (
-    Law,
+    Contender,
     Names,
     degrees,
     listed,
@@ -20,11 +20,11 @@ from dikbench.report.sentences.words import (
     number,
     several,
 )
-from dikbench.statistics.problems import LAW
 from dikbench.statistics.stability import DRIFT, STABLE
+from dikbench.statistics.trial_matrix import CONTENDER
 
 ON_COURSE: Final = math.radians(1.0)
-"""A law that is never farther off course than this stays on it."""
+"""A formulation that is never farther off course than this stays on it."""
 
 KEPT: Final = {
     "position_violation_max_rad": NEGLIGIBLE,
@@ -38,10 +38,10 @@ over a control period of 1 ms, is the one of accelerations; of distances, what i
 step. Limits of torques have their tolerance in the metric."""
 
 TRUSTED: Final = 0.01
-"""Laws whose solver's answers fail the recheck in more than this share of a run's steps lead in
-nothing: a wrong answer can look better than the right one."""
+"""Formulations whose solver's answers fail the recheck in more than this share of a run's steps
+lead in nothing: a wrong answer can look better than the right one."""
 
-NOBODY: Final = "No law in this run"
+NOBODY: Final = "No formulation in this run"
 ALL_ANSWERED: Final = "No trial failed and every step was answered."
 
 
@@ -51,31 +51,33 @@ class Finding:
 
     Attributes:
         question: in a few words.
-        text: the sentence; names of laws stand between backticks.
+        text: the sentence; names of formulations stand between backticks.
     """
 
     question: str
     text: str
 
 
-def candidates(rows: pd.DataFrame) -> list[Law]:
+def candidates(rows: pd.DataFrame) -> list[Contender]:
     """The laws that ran every trial of the rows without failing, with answers that can be trusted.
 
     Args:
         rows: trials of one plant and one reference mode.
     """
     trials = len(rows[["scenario", "seed"]].drop_duplicates())
-    groups = rows.groupby(LAW, sort=False)
-    whole = rows.assign(ok=rows["status"].eq("ok")).groupby(LAW, sort=False)["ok"].sum() == trials
+    groups = rows.groupby(CONTENDER, sort=False)
+    whole = (
+        rows.assign(ok=rows["status"].eq("ok")).groupby(CONTENDER, sort=False)["ok"].sum() == trials
+    )
     trusted = groups["not_verified_share"].max().fillna(0.0) <= TRUSTED
     return list(whole[whole & trusted].index)
 
 
-def keepers(rows: pd.DataFrame) -> list[Law]:
+def keepers(rows: pd.DataFrame) -> list[Contender]:
     """The candidates that keep every limit that is in force, in every trial."""
-    worst = rows.groupby(LAW, sort=False)[list(KEPT)].max().fillna(0.0)  # not in force: kept
+    worst = rows.groupby(CONTENDER, sort=False)[list(KEPT)].max().fillna(0.0)  # not in force: kept
     kept = (worst <= pd.Series(KEPT)).all(axis=1)
-    return [law for law in candidates(rows) if kept[law]]
+    return [contender for contender in candidates(rows) if kept[contender]]
 
 
 def most_accurate(rows: pd.DataFrame, names: Names) -> Finding:
@@ -86,12 +88,12 @@ def most_accurate(rows: pd.DataFrame, names: Names) -> Finding:
         return Finding(question, f"{NOBODY} went through all trials with answers to be trusted.")
     leader, measure = found
     text = _accuracy(leader, measure, names)
-    keeping = set(leader.laws) & set(keepers(rows))
-    if keeping == set(leader.laws):
+    keeping = set(leader.contenders) & set(keepers(rows))
+    if keeping == set(leader.contenders):
         text += ". Every limit is kept"
     elif not keeping:
-        peaks = rows.groupby(LAW)["velocity_peak_ratio"].max()
-        peak = max(peaks[law] for law in leader.laws)
+        peaks = rows.groupby(CONTENDER)["velocity_peak_ratio"].max()
+        peak = max(peaks[contender] for contender in leader.contenders)
         text += ". The limits are not kept"
         text += f": joint speeds reach {number(peak)} times their limit" if peak > 1 else ""
     return Finding(question, f"{text}.")
@@ -110,12 +112,13 @@ def most_accurate_within_limits(rows: pd.DataFrame, names: Names) -> Finding:
 
 def keep_limits(rows: pd.DataFrame, names: Names) -> Finding:
     """Who keeps every limit."""
-    laws, every = keepers(rows), rows[LAW].drop_duplicates()
+    contenders, every = keepers(rows), rows[CONTENDER].drop_duplicates()
     question = "Keeps every limit"
-    if laws:
+    if contenders:
         return Finding(
             question,
-            f"{names.of(laws)}: {len(laws)} of {len(every)} laws with their solvers, in "
+            f"{names.of(contenders)}: {len(contenders)} of {len(every)} formulations "
+            f"with their solvers, in "
             f"{_every_trial(rows)}.",
         )
     return Finding(question, f"{NOBODY} keeps every limit in {_every_trial(rows)}.")
@@ -124,26 +127,26 @@ def keep_limits(rows: pd.DataFrame, names: Names) -> Finding:
 def stay_on_course(rows: pd.DataFrame, names: Names) -> Finding:
     """Who slows down rather than leave the wanted direction, and who of them gets on best."""
     question = "Stays on course"
-    worst = rows.groupby(LAW, sort=False)["off_course_max_rad"].max()
-    ran = [law for law in candidates(rows) if not math.isnan(worst[law])]
+    worst = rows.groupby(CONTENDER, sort=False)["off_course_max_rad"].max()
+    ran = [contender for contender in candidates(rows) if not math.isnan(worst[contender])]
     if not ran:
         return Finding(question, f"{NOBODY} went through all trials with answers to be trusted.")
-    staying = [law for law in ran if worst[law] <= ON_COURSE]
+    staying = [contender for contender in ran if worst[contender] <= ON_COURSE]
     if not staying:
-        least = min(ran, key=lambda law: float(worst[law]))
+        least = min(ran, key=lambda contender: float(worst[contender]))
         return Finding(
             question,
             f"{NOBODY} stays within {degrees(ON_COURSE)} of the wanted direction; "
             f"nearest to it {names.of([least])}, at most {degrees(worst[least])} off.",
         )
     text = f"{names.of(staying)}: never more than {degrees(ON_COURSE)} off the wanted direction"
-    keeping = [law for law in keepers(rows) if law in set(staying)]
+    keeping = [contender for contender in keepers(rows) if contender in set(staying)]
     leader = lead(rows.assign(slowness=-rows["progress_mean"]), "slowness", keeping)
     if leader is None:
         return Finding(question, f"{text}, but none of them keeps every limit.")
     speed = f"at {number(-100 * leader.value)} % of the wanted speed (median)"
     if leader.runner_up is not None:
-        best = f"{names.of(leader.laws)} {'get' if len(leader.laws) > 1 else 'gets'} on best"
+        best = f"{names.of(leader.contenders)} get{'s' * (len(leader.contenders) == 1)} on best"
     else:
         best = names.of(keeping) + (" get on alike" if len(keeping) > 1 else " alone gets on")
         if len(keeping) == len(staying) > 1:
@@ -155,11 +158,11 @@ def fail_most(rows: pd.DataFrame, names: Names) -> Finding:
     """Who fails most: by trials that broke off, else by steps that a law had no answer for."""
     question = "Fails most"
     failed = rows["status"].ne("ok")
-    groups = rows.assign(failed=failed).groupby(LAW, sort=False)
+    groups = rows.assign(failed=failed).groupby(CONTENDER, sort=False)
     shares = groups["failed"].mean()
     if failed.any():
         most = list(shares[shares.ge(shares.max() - SAME)].index)
-        counts = rows[failed].set_index(LAW).loc[most, "status"].value_counts()
+        counts = rows[failed].set_index(CONTENDER).loc[most, "status"].value_counts()
         reasons = listed([f"{number} {status}" for status, number in counts.items()])
         ended = several(int(groups["failed"].sum()[most].sum()), "trial")
         each = " each" if len(most) > 1 else ""
@@ -169,7 +172,7 @@ def fail_most(rows: pd.DataFrame, names: Names) -> Finding:
             f"({ended}: {reasons}).",
         )
     of_a_run = rows[["infeasible_share", "solver_failed_share"]].sum(axis=1)
-    unanswered = rows.assign(unanswered=of_a_run).groupby(LAW, sort=False)["unanswered"].max()
+    unanswered = rows.assign(unanswered=of_a_run).groupby(CONTENDER, sort=False)["unanswered"].max()
     worst = float(unanswered.max())
     if worst <= 0:
         return Finding(question, ALL_ANSWERED)
@@ -181,24 +184,24 @@ def fail_most(rows: pd.DataFrame, names: Names) -> Finding:
     )
 
 
-def fastest(rows: pd.DataFrame, within_limits: Sequence[Law], names: Names) -> Finding:
-    """Whose call takes the least time, of all laws and of those that keep every limit.
+def fastest(rows: pd.DataFrame, within_limits: Sequence[Contender], names: Names) -> Finding:
+    """Whose call takes the least time, of all formulations and of those that keep every limit.
 
     Args:
         rows: trials, of any plant.
-        within_limits: the laws that keep every limit.
+        within_limits: the formulations that keep every limit.
         names: how they are called.
     """
     question = "Fastest"
-    cells = rows.drop_duplicates([*LAW, "scenario"])
-    cells = cells[cells["law_time_median_us"].notna()]
+    cells = rows.drop_duplicates([*CONTENDER, "scenario"])
+    cells = cells[cells["formulation_time_median_us"].notna()]
     if cells.empty:
         return Finding(question, "No times were taken.")
-    timed = cells.groupby(LAW, sort=False)["scenario"].nunique()
-    medians = cells.groupby(LAW, sort=False)["law_time_median_us"].median()
+    timed = cells.groupby(CONTENDER, sort=False)["scenario"].nunique()
+    medians = cells.groupby(CONTENDER, sort=False)["formulation_time_median_us"].median()
     medians = medians[timed.eq(timed.max())].sort_values(kind="stable")
     parts = [_quickest(medians, names)]
-    keeping = medians[[law for law in medians.index if law in set(within_limits)]]
+    keeping = medians[[contender for contender in medians.index if contender in set(within_limits)]]
     if len(keeping) and not set(keeping.index[:1]) <= set(_alike(medians)):
         parts.append("of those that keep every limit " + _quickest(keeping, names))
     if len(medians) > 1:
@@ -207,7 +210,7 @@ def fastest(rows: pd.DataFrame, within_limits: Sequence[Law], names: Names) -> F
             f"{number(medians.iloc[-1] / medians.iloc[0])} times as long"
         )
     text = f"{'; '.join(parts)} (medians over {several(int(timed.max()), 'scenario')})."
-    unstable = int(cells["timing_verdict"].ne(STABLE).sum())
+    unstable = int(cells["timing_stability"].ne(STABLE).sum())
     if unstable:
         text += f" Of {len(cells)} timed cells {unstable} are not stable."
     return Finding(question, text)
@@ -223,18 +226,20 @@ def _quickest(medians: pd.Series, names: Names) -> str:
     )
 
 
-def _alike(medians: pd.Series) -> list[Law]:
-    """The laws whose times are no farther from the shortest than a stable time may drift."""
+def _alike(medians: pd.Series) -> list[Contender]:
+    """Those whose times are no farther from the shortest than a stable time may drift."""
     return list(medians[medians <= (1 + DRIFT) * medians.iloc[0]].index)
 
 
-def _closest(rows: pd.DataFrame, laws: Sequence[Law]) -> tuple[Lead, Callable[[float], str]] | None:
+def _closest(
+    rows: pd.DataFrame, contenders: Sequence[Contender]
+) -> tuple[Lead, Callable[[float], str]] | None:
     """Who leads in the position error, or in that of the orientation where there is no other."""
     for metric, measure in (
         ("position_error_rms_m", millimetres),
         ("orientation_error_rms_rad", degrees),
     ):
-        leader = lead(rows, metric, laws)
+        leader = lead(rows, metric, contenders)
         if leader is not None:
             return leader, measure
     return None
@@ -243,8 +248,8 @@ def _closest(rows: pd.DataFrame, laws: Sequence[Law]) -> tuple[Lead, Callable[[f
 def _accuracy(leader: Lead, measure: Callable[[float], str], names: Names) -> str:
     one = leader.trials == 1
     rms = "rms" if one else f"rms, median over {leader.trials} trials"
-    together = ", not told apart," if len(leader.laws) > 1 else ""
-    text = f"{names.of(leader.laws)}{together} with {measure(leader.value)} ({rms})"
+    together = ", not told apart," if len(leader.contenders) > 1 else ""
+    text = f"{names.of(leader.contenders)}{together} with {measure(leader.value)} ({rms})"
     if leader.runner_up is None:
         return text
     behind = "" if one else f", behind in {leader.wins} of {leader.trials}"

@@ -12,11 +12,10 @@ from dikbench.plugins.registry import plugins
 from dikbench.report.sentences.words import listed, number, quoted, several
 from dikbench.scenario.oracle import ORACLE
 from dikbench.scenario.plant import DRIVES, REFERENCE_MODES
-from dikbench.selector import parse_selector
 from dikbench.solvers.catalogue.back_ends import BACK_ENDS, is_installed
 from dikbench.statistics.failures import SKIPPED, has_failed
-from dikbench.statistics.problems import LAW
 from dikbench.statistics.stability import STABLE
+from dikbench.statistics.trial_matrix import CONTENDER
 
 WORTH_SAYING: Final = 0.01
 """A share of steps above this is remarked upon."""
@@ -97,7 +96,7 @@ def in_plan(trials: pd.DataFrame, study: Mapping[str, Any]) -> pd.Series:
 
 
 def _times(trials: pd.DataFrame) -> list[Limitation]:
-    if not trials["law_time_median_us"].notna().any():
+    if not trials["formulation_time_median_us"].notna().any():
         return [Limitation("No times were taken: nothing is said of speed.")]
     found = [
         Limitation(
@@ -105,18 +104,18 @@ def _times(trials: pd.DataFrame) -> list[Limitation]:
             "qpsolvers, where their selector names no other interface."
         )
     ]
-    cells = trials.drop_duplicates([*LAW, "scenario"])
-    cells = cells[cells["timing_verdict"].notna()]
-    unstable = cells[cells["timing_verdict"] != STABLE]
+    cells = trials.drop_duplicates([*CONTENDER, "scenario"])
+    cells = cells[cells["timing_stability"].notna()]
+    unstable = cells[cells["timing_stability"] != STABLE]
     if len(unstable):
         found.append(
             Limitation(
                 f"Of {len(cells)} timed cells {len(unstable)} are not stable (greyed; timing.csv "
                 "says why); `dikbench time` takes them anew, on a machine that does nothing else.",
                 tuple(
-                    f"{_law(formulation, solver)} on {quoted(scenario)}: {verdict}."
+                    f"{_named(formulation, solver)} on {quoted(scenario)}: {verdict}."
                     for (formulation, solver, scenario, verdict), _ in _counted(
-                        unstable, [*LAW, "scenario", "timing_verdict"]
+                        unstable, [*CONTENDER, "scenario", "timing_stability"]
                     )
                 ),
             )
@@ -130,7 +129,7 @@ def _seeds(trials: pd.DataFrame) -> list[Limitation]:
         return [
             Limitation(
                 f"There is one seed ({seeds[0]}): intervals are over scenarios and not over seeds, "
-                "and small differences between laws may be those of these scenarios."
+                "and small differences between formulations may be those of these scenarios."
             )
         ]
     return []
@@ -179,17 +178,17 @@ def _broken(trials: pd.DataFrame) -> list[Limitation]:
 
 
 def _reasons(rows: pd.DataFrame, what: str) -> tuple[str, ...]:
-    """How often each status and message occurs, and with which laws."""
+    """How often each status and message occurs, and with which formulations."""
     cases = []
     for (status, message), part in rows.groupby(["status", "message"], sort=False):
-        laws = part[LAW].drop_duplicates().itertuples(index=False, name=None)
-        names = listed([_law(*law) for law in laws])
+        contenders = part[CONTENDER].drop_duplicates().itertuples(index=False, name=None)
+        names = listed([_named(*contender) for contender in contenders])
         cases.append(f"{several(len(part), what)} {status}: {message} ({names}).")
     return tuple(cases)
 
 
 def _steps(trials: pd.DataFrame) -> list[Limitation]:
-    """Steps that were not answered as they should be, per law."""
+    """Steps that were not answered as they should be, per formulation."""
     found = []
     for column, text in (
         (
@@ -209,9 +208,9 @@ def _steps(trials: pd.DataFrame) -> list[Limitation]:
             "Acceleration bounds that were given up, where limits contradict one another.",
         ),
     ):
-        worst = trials.groupby(LAW, sort=False)[column].max().reset_index()
+        worst = trials.groupby(CONTENDER, sort=False)[column].max().reset_index()
         cases = tuple(
-            f"{_law(formulation, solver)}: in up to {number(100 * share)} % of a run's steps."
+            f"{_named(formulation, solver)}: in up to {number(100 * share)} % of a run's steps."
             for formulation, solver, share in worst.itertuples(index=False, name=None)
             if share > WORTH_SAYING
         )
@@ -224,26 +223,26 @@ def _not_run(trials: pd.DataFrame) -> list[Limitation]:
     """What is registered and no part of the run."""
     ran = trials[trials["status"] != SKIPPED]
     axes = (
-        ("laws", plugins("formulation"), "formulation"),
-        ("scenario families", plugins("scenario"), "scenario"),
-        ("solvers", [name for name in BACK_ENDS if is_installed(name)], "solver"),
+        ("formulations", plugins("formulation"), "formulation_name"),
+        ("scenario families", plugins("scenario"), "scenario_family"),
+        ("solvers", [name for name in BACK_ENDS if is_installed(name)], "solver_name"),
     )
     cases = []
     for what, known, column in axes:
-        used = {parse_selector(text).name for text in ran[column].unique()}
+        used = set(ran[column])
         left_out = [name for name in known if name not in used]
         if left_out:
             names = listed([quoted(name) for name in left_out], most=None)
             cases.append(f"{len(left_out)} of {len(known)} {what}: {names}.")
-    for column, modes in (("plant", DRIVES), ("reference", REFERENCE_MODES)):
-        used = {parse_selector(text).name for text in ran[column].unique()}
-        cases += [f"The {column} `{mode}`." for mode in modes if mode not in used]
+    for column, modes in (("plant_name", DRIVES), ("reference", REFERENCE_MODES)):
+        used, what = set(ran[column]), column.removesuffix("_name")
+        cases += [f"The {what} `{mode}`." for mode in modes if mode not in used]
     if not trials["formulation"].eq(ORACLE).any():
         cases.append("The oracle, a measure of how well a scenario can be done.")
     return [Limitation("What was not run, and of which nothing is said.", tuple(cases))]
 
 
-def _law(formulation: str, solver: str) -> str:
+def _named(formulation: str, solver: str) -> str:
     return quoted(formulation) + ("" if solver == "none" else f" with {quoted(solver)}")
 
 

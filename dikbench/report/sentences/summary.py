@@ -1,4 +1,4 @@
-"""Which law for which situation, in sentences that the trials carry."""
+"""Which formulation for which situation, in sentences that the trials carry."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from dikbench.report.selection.situations import READING_ORDER, Situation, situation_of
 from dikbench.report.sentences.findings import (
     ALL_ANSWERED,
     Finding,
@@ -17,7 +18,6 @@ from dikbench.report.sentences.findings import (
     most_accurate_within_limits,
     stay_on_course,
 )
-from dikbench.report.sentences.situations import READING_ORDER, Situation, situation_of
 from dikbench.report.sentences.words import Names, several
 from dikbench.scenario.oracle import ORACLE
 
@@ -58,7 +58,7 @@ class Summary:
 
 
 def summarise(trials: pd.DataFrame) -> Summary:
-    """Say which law is for which situation.
+    """Say which formulation is for which situation.
 
     Plants and reference modes are never pooled: the ideal plant is spoken of, on which violations
     show, and the clock as reference, where they were run.
@@ -66,12 +66,12 @@ def summarise(trials: pd.DataFrame) -> Summary:
     Args:
         trials: the rows of trials.csv.
     """
-    laws = trials[trials["formulation"].ne(ORACLE) & trials["status"].ne("skipped")]
-    if laws.empty:
-        return Summary("No law was run.")
-    plant, reference = _first(laws["plant"], "ideal"), _first(laws["reference"], "time")
-    rows = laws[laws["plant"].eq(plant) & laws["reference"].eq(reference)]
-    names = Names(laws)
+    contenders = trials[trials["formulation"].ne(ORACLE) & trials["status"].ne("skipped")]
+    if contenders.empty:
+        return Summary("No formulation was run.")
+    plant, reference = _first(contenders["plant"], "ideal"), _first(contenders["reference"], "time")
+    rows = contenders[contenders["plant"].eq(plant) & contenders["reference"].eq(reference)]
+    names = Names(contenders)
     seed = int(rows["seed"].min())
     kinds = {scenario: situation_of(scenario, seed) for scenario in rows["scenario"].unique()}
     chapters = []
@@ -90,8 +90,8 @@ def summarise(trials: pd.DataFrame) -> Summary:
     short = (
         keep_limits(rows, names),
         stay_on_course(rows, names),
-        fastest(laws, keepers(rows), names),
-        fail_most(laws, names),
+        fastest(contenders, keepers(rows), names),
+        fail_most(contenders, names),
     )
     return Summary(basis, short, tuple(chapters))
 

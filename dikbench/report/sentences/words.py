@@ -8,7 +8,7 @@ from typing import Final
 
 import pandas as pd
 
-Law = tuple[str, str]
+Contender = tuple[str, str]
 """A formulation and its solver."""
 
 FEW: Final = 6
@@ -57,7 +57,7 @@ def quoted(name: str) -> str:
 
 
 class Names:
-    """How laws with their solvers are called in the sentences of one run.
+    """How formulations with their solvers are called in the sentences of one run.
 
     Args:
         rows: every trial of the run.
@@ -67,10 +67,10 @@ class Names:
         pairs = rows[["formulation", "solver"]].drop_duplicates()
         self._solvers = pairs.groupby("formulation", sort=False)["solver"].agg(list).to_dict()
 
-    def of(self, laws: Iterable[Law]) -> str:
-        """The laws in words: `dls`, `qp` (all 8 solvers) and `lp-alpha` (daqp)."""
+    def of(self, contenders: Iterable[Contender]) -> str:
+        """The formulations in words: `dls`, `qp` (all 8 solvers) and `lp-alpha` (daqp)."""
         groups: dict[str, list[str]] = {}
-        for formulation, solver in laws:
+        for formulation, solver in contenders:
             groups.setdefault(formulation, []).append(solver)
         return listed([self._named(*group) for group in groups.items()])
 

@@ -8,28 +8,23 @@ import numpy as np
 import pandas as pd
 
 from dikbench.arrays import Mask
-from dikbench.report.tables.columns import NEGLIGIBLE, Sample, describe
 from dikbench.report.tables.kinds import DERIVED, FAILURES, Quantity, TableKind
-from dikbench.report.tables.table import ALL, DIGITS, Block, Column, Row, Table
-from dikbench.selector import parse_selector
-from dikbench.statistics.failures import has_failed, ran, with_failures
-from dikbench.statistics.problems import LAW
+from dikbench.report.tables.sample import SMALLEST_DIFFERENCE, Sample, describe
+from dikbench.report.tables.table import ALL, DIGITS, Block, Column, Table, TableRow
+from dikbench.statistics.failures import failures_at_worst, has_failed, ran
 from dikbench.statistics.stability import STABLE
+from dikbench.statistics.trial_matrix import CONTENDER
 
 HOW = ["plant", "reference"]
 
 _Setting = tuple[str | None, str | None]
 
 
-def family(scenario: str) -> str:
-    """The family of a scenario's selector."""
-    return parse_selector(scenario).name
-
-
 def make_table(kind: TableKind, trials: pd.DataFrame) -> Table:
     """A table, overall and per family; plants and reference modes are never pooled.
 
-    Trials that were skipped count nowhere; a law of which all trials were skipped has no row.
+    Trials that were skipped count nowhere; a formulation of which all trials were skipped has no
+    row.
 
     Args:
         kind: which table.
@@ -39,7 +34,7 @@ def make_table(kind: TableKind, trials: pd.DataFrame) -> Table:
     rows = _derived(ran(trials))
     if not kind.times:  # a failure is never folded into a time
         measured = {q.of for q in chosen} - set(DERIVED)
-        rows = rows.assign(**{name: with_failures(rows, name) for name in sorted(measured)})
+        rows = rows.assign(**{name: failures_at_worst(rows, name) for name in sorted(measured)})
     columns = tuple(describe(quantity, rows) for quantity in chosen)
     blocks = [
         _block(kind, chosen, columns, name, how, part)
@@ -50,22 +45,20 @@ def make_table(kind: TableKind, trials: pd.DataFrame) -> Table:
 
 
 def _derived(rows: pd.DataFrame) -> pd.DataFrame:
-    """Rows with their family, and with what is counted as columns of zeros and ones."""
-    families = {name: family(name) for name in rows["scenario"].unique()}
-    timed = rows["law_time_median_us"].notna()
+    """Add what is counted as columns of zeros and ones."""
+    timed = rows["formulation_time_median_us"].notna()
     return rows.assign(
-        family=rows["scenario"].map(families),
         trial=1.0,
         failed=has_failed(rows).astype(float),
         timed=timed.astype(float),
-        unstable=(timed & (rows["timing_verdict"] != STABLE)).astype(float),
+        unstable=(timed & (rows["timing_stability"] != STABLE)).astype(float),
     )
 
 
 def _families(rows: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
     if len(rows):
         yield ALL, rows
-        for name, part in rows.groupby("family", sort=False):
+        for name, part in rows.groupby("scenario_family", sort=False):
             yield str(name), part
 
 
@@ -86,11 +79,11 @@ def _block(
     how: _Setting,
     rows: pd.DataFrame,
 ) -> Block:
-    laws = rows[LAW].drop_duplicates()
-    trials = Sample.of(rows, np.zeros(len(laws), dtype=bool))
+    contenders = rows[CONTENDER].drop_duplicates()
+    trials = Sample.of(rows, np.zeros(len(contenders), dtype=bool))
     measured = trials
     if kind.times:
-        one_each = rows.drop_duplicates([*LAW, "scenario"])
+        one_each = rows.drop_duplicates([*CONTENDER, "scenario"])
         cells = one_each[[name for name in rows if name not in (*HOW, "seed")]]
         cells = cells.assign(failed=0.0)  # a time was taken whatever became of the trial
         measured = Sample.of(cells, _unstable(cells))
@@ -99,9 +92,9 @@ def _block(
         for quantity, column in zip(quantities, columns, strict=True)
     ]
     found = [
-        Row(str(formulation), str(solver), tuple(cells))
+        TableRow(str(formulation), str(solver), tuple(cells))
         for formulation, solver, *cells in zip(
-            laws["formulation"], laws["solver"], *grid, strict=True
+            contenders["formulation"], contenders["solver"], *grid, strict=True
         )
     ]
     plant, reference = how
@@ -109,8 +102,8 @@ def _block(
 
 
 def _unstable(cells: pd.DataFrame) -> Mask:
-    """Whether at least half of the timed cells of each law are unstable."""
-    sums = cells.groupby(LAW, sort=False)[["timed", "unstable"]].sum()
+    """Whether at least half of the timed cells of each formulation are unstable."""
+    sums = cells.groupby(CONTENDER, sort=False)[["timed", "unstable"]].sum()
     unstable: Mask = (sums["timed"].gt(0) & (2 * sums["unstable"] >= sums["timed"])).to_numpy()
     return unstable
 
@@ -132,6 +125,6 @@ def _notes(kind: TableKind, columns: Sequence[Column]) -> Iterator[str]:
     )
     yield (
         f"The best law is marked where laws differ in {DIGITS} digits and by more than "
-        f"{NEGLIGIBLE:g}, among those that have a number of every trial that any law came "
+        f"{SMALLEST_DIFFERENCE:g}, among those that have a number of every trial that any law came "
         "through; the oracle is not compared."
     )

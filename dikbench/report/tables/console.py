@@ -7,7 +7,7 @@ from math import isnan
 from textwrap import wrap
 
 from dikbench.report.tables.kinds import FAILURES
-from dikbench.report.tables.table import Block, Cell, Column, Row, Table, shown
+from dikbench.report.tables.table import Block, Column, Table, TableCell, TableRow, shown
 
 WIDTH = 120
 """Characters to a line."""
@@ -16,10 +16,10 @@ BLOCKS = 2
 """Plants and reference modes that are printed of a table; the others stand in the files."""
 
 ROWS = 12
-"""Laws that are printed of a block."""
+"""Formulations that are printed of a block."""
 
 NAME = 40
-"""Characters of a law with its solver."""
+"""Characters of a formulation with its solver."""
 
 HEADING = 12
 """Characters to a line of a heading, unless a word is longer."""
@@ -46,7 +46,7 @@ def _block(table: Table, block: Block) -> str:
     rows = sorted(block.rows, key=lambda row: (row.cells[0].value, *_last_if_nan(row.cells[first])))
     top = rows[:ROWS]
     columns = [
-        ["law", *(_name(row) for row in top)],
+        ["contender", *(_name(row) for row in top)],
         ["failed", *(f"{row.cells[1].value:.0f}/{row.cells[2].value:.0f}" for row in top)],
     ]
     for place in numbers:
@@ -59,7 +59,7 @@ def _block(table: Table, block: Block) -> str:
     return "\n".join(lines)
 
 
-def _last_if_nan(cell: Cell) -> tuple[bool, float]:
+def _last_if_nan(cell: TableCell) -> tuple[bool, float]:
     return (True, 0.0) if isnan(cell.value) else (False, cell.value)
 
 
@@ -82,13 +82,13 @@ def _fitting(columns: Sequence[Sequence[str]]) -> list[str]:
     return [line.rstrip() for line in lines if line.strip()]
 
 
-def _name(row: Row) -> str:
+def _name(row: TableRow) -> str:
     name = row.formulation if row.solver == "none" else f"{row.formulation}, {row.solver}"
     line = "".join(character for character in " ".join(name.split()) if character.isprintable())
     return line if len(line) <= NAME else f"{line[: NAME - 3]}..."
 
 
-def _text(column: Column, cell: Cell) -> str:
+def _text(column: Column, cell: TableCell) -> str:
     if isnan(cell.value):
         return ""
     if column.count:

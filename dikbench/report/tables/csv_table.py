@@ -7,13 +7,13 @@ from math import isnan
 
 import pandas as pd
 
-from dikbench.report.tables.table import Cell, Column, Table
+from dikbench.report.tables.table import Column, Table, TableCell
 
 
 def to_csv(table: Table) -> str:
-    """A row per block, law and solver; what was not measured is empty, infinity is `inf`."""
+    """A row per block, formulation and solver; what was not measured is empty, infinity `inf`."""
     keys = ["family", *_setting(table), "formulation", "solver"]
-    numbers = [name for column in table.columns for name, _ in _numbers(column, Cell(0.0))]
+    numbers = [name for column in table.columns for name, _ in _numbers(column, TableCell(0.0))]
     rows = [
         [
             block.family,
@@ -37,7 +37,7 @@ def _setting(table: Table) -> list[str]:
     return ["plant", "reference"] if any(block.plant for block in table.blocks) else []
 
 
-def _numbers(column: Column, cell: Cell) -> Iterator[tuple[str, float | int]]:
+def _numbers(column: Column, cell: TableCell) -> Iterator[tuple[str, float | int]]:
     if column.count:
         yield column.key, int(cell.value)
         return

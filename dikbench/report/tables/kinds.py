@@ -30,7 +30,7 @@ class Quantity:
         statistic: what is taken over the trials of a row.
         heading: what stands above it.
         key: its name in CSV.
-        compared: whether the best law is marked.
+        compared: whether the best formulation is marked.
     """
 
     of: str
@@ -57,8 +57,8 @@ class TableKind:
         name: of its files.
         title: one line above it.
         quantities: what it shows after the failures, the most telling first.
-        times: whether its numbers are times, which belong to a law, a solver and a scenario,
-            whatever the plant, reference mode and seed.
+        times: whether its numbers are times, which belong to a formulation, a solver and a
+            scenario, whatever the plant, reference mode and seed.
     """
 
     name: str
@@ -71,7 +71,7 @@ DERIVED: Mapping[str, str] = MappingProxyType(
     {
         "trial": "1 for a trial that was not skipped",
         "failed": "1 for a trial that broke off (diverged, crashed, timed out ...), else 0",
-        "timed": "1 for a scenario on which the law was timed",
+        "timed": "1 for a scenario on which the formulation was timed",
         "unstable": "1 for a scenario on which its times cannot be trusted",
     }
 )
@@ -156,16 +156,16 @@ LIMIT_VIOLATION = TableKind(
 
 TIMING = TableKind(
     "timing",
-    "Timing of one call of the law: averages over scenarios, and the worst of them",
+    "Timing of one call of the formulation: averages over scenarios, and the worst of them",
     (
         *CELLS,
-        _average("law_time_median_us", "median [us]"),
-        _part("law_own_time_median_us", "of it law [us]"),
+        _average("formulation_time_median_us", "median [us]"),
+        _part("formulation_own_time_median_us", "of it formulation [us]"),
         _part("solver_core_time_median_us", "solver [us]"),
         _part("solver_wrapper_time_median_us", "wrapper [us]"),
-        _average("law_time_p99_us", "p99 [us]"),
-        _part("law_time_p999_us", "p99.9 [us]"),
-        _worst("law_time_max_us", "longest [us]"),
+        _average("formulation_time_p99_us", "p99 [us]"),
+        _part("formulation_time_p999_us", "p99.9 [us]"),
+        _worst("formulation_time_max_us", "longest [us]"),
         _worst("missed_1000_hz_share", "missed at 1 kHz worst"),
         _part("kinematics_time_median_us", "kinematics beside it [us]"),
     ),

@@ -7,7 +7,7 @@ from math import isnan
 from textwrap import wrap
 from unicodedata import decomposition
 
-from dikbench.report.tables.table import ALL, Block, Cell, Column, Table, shown
+from dikbench.report.tables.table import ALL, Block, Column, Table, TableCell, shown
 
 HEADING = 12
 """Characters to a line of a heading, unless a word is longer."""
@@ -98,7 +98,7 @@ def _line(cells: Iterable[str]) -> str:
     return " & ".join(cells) + r" \\"
 
 
-def _cell(column: Column, cell: Cell) -> str:
+def _cell(column: Column, cell: TableCell) -> str:
     if isnan(cell.value):
         return ""
     if column.count:

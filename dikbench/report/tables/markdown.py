@@ -8,7 +8,7 @@ from math import isnan
 
 import pandas as pd
 
-from dikbench.report.tables.table import ALL, Block, Cell, Column, Table, shown
+from dikbench.report.tables.table import ALL, Block, Column, Table, TableCell, shown
 
 NOTHING = "Nothing was measured."
 
@@ -93,7 +93,7 @@ def markdown_blocks(table: Table, blocks: Iterable[Block]) -> str:
     return "\n\n".join(parts) or NOTHING
 
 
-def _cell(column: Column, cell: Cell) -> str:
+def _cell(column: Column, cell: TableCell) -> str:
     if isnan(cell.value):
         return ""
     if column.count:

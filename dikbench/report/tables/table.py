@@ -50,14 +50,15 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Cell:
+class TableCell:
     """A number in a table.
 
     Attributes:
         value: the number; NaN where nothing was measured, infinite where a failed trial's is.
         lower: lower end of its 95 % interval; NaN where there is none.
         upper: upper end of it.
-        best: whether no other law of the block has a better one (several may be equally good).
+        best: whether no other formulation of the block has a better one (several may be equally
+            good).
         unstable: whether it rests on times that cannot be trusted: to be greyed.
     """
 
@@ -75,18 +76,18 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Row:
-    """What a law with its solver achieved.
+class TableRow:
+    """What a formulation with its solver achieved.
 
     Attributes:
-        formulation: selector of the law, as the user wrote it: escape it.
+        formulation: selector of the formulation, as the user wrote it: escape it.
         solver: selector of the solver, or `none`.
         cells: one per column of the table.
     """
 
     formulation: str
     solver: str
-    cells: tuple[Cell, ...]
+    cells: tuple[TableCell, ...]
 
 
 @dataclass(frozen=True)
@@ -97,13 +98,13 @@ class Block:
         family: of the scenarios, or `ALL`.
         plant: selector of the plant; None where the table does not tell plants apart (times).
         reference: `time` or `path`; None likewise.
-        rows: one per law and solver, in the order of the trials.
+        rows: one per formulation and solver, in the order of the trials.
     """
 
     family: str
     plant: str | None
     reference: str | None
-    rows: tuple[Row, ...]
+    rows: tuple[TableRow, ...]
 
     @property
     def setting(self) -> str:

@@ -149,7 +149,7 @@ def is_installed(name: str) -> bool:
     return importlib.util.find_spec(BACK_ENDS[name].package) is not None
 
 
-def parse_solver(text: str) -> Solver:
+def parse_solver(text: str | Selector) -> Solver:
     """Read a selector such as `osqp`, `osqp[preset=high]` or `clarabel[interface=warm]`.
 
     A setting that is named beside a preset goes before the preset's.

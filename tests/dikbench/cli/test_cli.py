@@ -16,7 +16,7 @@ from dikbench.cli.listing import listing
 from dikbench.metrics import METRICS
 from dikbench.plugins.registry import plugins
 
-LAW = '''
+FORMULATION = '''
 from __future__ import annotations
 from dataclasses import dataclass
 
@@ -72,7 +72,7 @@ def test_help_does_not_import_anything_heavy() -> None:
         (("run", "nosuch"), ("nosuch", "quick")),
         (("run", "--formulation", "dls[damping=many]"), ("damping", "float")),
         (("run", "--formulation", "dls[dampin=1]"), ("dampin", "valid: damping")),
-        (("run", "--formulation", "nofile.py:Law"), ("nofile.py",)),
+        (("run", "--formulation", "nofile.py:Formulation"), ("nofile.py",)),
         (("run", "--solver", "osqp[eps=1]"), ("eps", "eps_abs")),
         (("run", "--scenario", "reach[robot=bad.urdf,frame=tip]"), ("bad.urdf", "URDF")),
         (("run", "--scenario", "near-miss[robot=talos,singularity=wrist]"), ("wrist", "elbow")),
@@ -88,7 +88,7 @@ def test_help_does_not_import_anything_heavy() -> None:
         (("run", "--seed", "-1"), ("-1",)),
         (("run", "--out", "afile/inside", "--formulation", "dls"), ("afile/inside",)),
         (("recompute", "nowhere"), ("no results", "nowhere")),
-        (("list", "laws"), ("laws", "formulations")),
+        (("list", "formulations"), ("formulations", "formulations")),
         (("show", "nothing"), ("nothing", "valid")),
         (("--plnt",), ("--plnt",)),
     ],
@@ -128,7 +128,7 @@ def test_a_plugin_of_another_project_is_listed_and_runs(tmp_path: Path) -> None:
     site = tmp_path / "site"
     info = site / "my_project-1.0.dist-info"
     info.mkdir(parents=True)
-    (site / "my_laws.py").write_text(LAW + '\nFORMULATIONS = {"my-law": MyLaw}\n')
+    (site / "my_laws.py").write_text(FORMULATION + '\nFORMULATIONS = {"my-formulation": MyLaw}\n')
     (site / "my_scenarios.py").write_text(
         "from scenarios.reach import reach\n"
         "def my_family(distance: float = 0.05, *, seed: int = 0):\n"
@@ -142,21 +142,21 @@ def test_a_plugin_of_another_project_is_listed_and_runs(tmp_path: Path) -> None:
     )
     listed = dikbench("list", cwd=tmp_path, path=site)
     assert listed.returncode == 0, listed.stderr
-    assert "my-law" in listed.stdout
+    assert "my-formulation" in listed.stdout
     assert "my-family" in listed.stdout
     done = dikbench(
-        "run", "--formulation", "my-law[gain=2]", "--scenario", "my-family[distance=0.1]",
+        "run", "--formulation", "my-formulation[gain=2]", "--scenario", "my-family[distance=0.1]",
         "--plant", "ideal", "--out", "out", cwd=tmp_path, path=site,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     trials = pd.read_csv(tmp_path / "out" / "trials.csv")
-    assert list(trials["formulation"]) == ["my-law[gain=2]"]
+    assert list(trials["formulation"]) == ["my-formulation[gain=2]"]
     assert list(trials["status"]) == ["ok"]
 
 
 def test_a_law_in_a_file_runs_without_packaging(tmp_path: Path) -> None:
     """`path/to/file.py:Class` is resolved in each worker from its text, with parameters."""
-    (tmp_path / "my_law.py").write_text(LAW)
+    (tmp_path / "my_law.py").write_text(FORMULATION)
     done = dikbench(
         "run", "--formulation", "my_law.py:MyLaw", "--formulation", "my_law.py:MyLaw[gain=2]",
         "--scenario", "reach", "--out", "out", cwd=tmp_path,
@@ -164,8 +164,8 @@ def test_a_law_in_a_file_runs_without_packaging(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     trials = pd.read_csv(tmp_path / "out" / "trials.csv")
     assert set(trials["status"]) == {"ok"}
-    by_law = trials[trials["plant"] == "ideal"].set_index("formulation")["progress_mean"]
-    assert by_law["my_law.py:MyLaw[gain=2]"] > by_law["my_law.py:MyLaw"]
+    by_formulation = trials[trials["plant"] == "ideal"].set_index("formulation")["progress_mean"]
+    assert by_formulation["my_law.py:MyLaw[gain=2]"] > by_formulation["my_law.py:MyLaw"]
 
 
 @pytest.mark.parametrize(
@@ -180,7 +180,7 @@ def test_a_law_in_a_file_runs_without_packaging(tmp_path: Path) -> None:
     ],
 )
 def test_show_prints_one_thing_in_full(tmp_path: Path, name: str, expected: str) -> None:
-    """`dikbench show` knows laws, scenarios, solvers, robots, metrics and studies."""
+    """`dikbench show` knows formulations, scenarios, solvers, robots, metrics and studies."""
     done = dikbench("show", name, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert expected in done.stdout
@@ -277,7 +277,7 @@ class Spin:
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such signal")
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
 def test_no_worker_outlives_its_driver(tmp_path: Path, how: signal.Signals) -> None:
-    """However the driver ends, a law that loops for ever ends with it."""
+    """However the driver ends, a formulation that loops for ever ends with it."""
     (tmp_path / "spin.py").write_text(SPINNING)
     arguments = ["run", "--formulation", "spin.py:Spin", *SHORT[2:], "--out", "out", "--jobs", "1"]
     process = subprocess.Popen(

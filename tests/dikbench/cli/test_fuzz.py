@@ -22,7 +22,8 @@ from dikbench import cli
 from dikbench.errors import DikbenchError
 from dikbench.plugins.registry import make_formulation, scenario_parameters
 from dikbench.solvers.catalogue.back_ends import parse_solver
-from dikbench.study.study import Study, expand, load_study
+from dikbench.study.plan import expand
+from dikbench.study.study import Study, load_study
 
 EXAMPLES = int(os.environ.get("DIKBENCH_FUZZ", "2000"))
 
@@ -110,7 +111,7 @@ def test_a_study_file_is_valid_or_one_line(text: str) -> None:
 @settings(max_examples=EXAMPLES // 4, deadline=None, suppress_health_check=list(HealthCheck))
 @given(text=selectors())
 def test_a_selector_is_valid_or_one_line(text: str) -> None:
-    """Of a law, a scenario and a solver."""
+    """Of a formulation, a scenario and a solver."""
     for read in (make_formulation, scenario_parameters, parse_solver):
         try:
             read(text)

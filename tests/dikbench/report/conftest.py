@@ -13,12 +13,13 @@ import pytest
 from dikbench.metrics import METRICS
 from dikbench.report.drawing import style as style_module
 from dikbench.results.columns import RATES, TIMES
+from dikbench.results.selected import with_selected
 
 MakeTrials = Callable[..., pd.DataFrame]
 
 
 def made_up(
-    laws: Iterable[str | tuple[str, str]],
+    contenders: Iterable[str | tuple[str, str]],
     scenarios: Iterable[str],
     seeds: Iterable[int] = (0,),
     plants: Iterable[str] = ("ideal",),
@@ -27,16 +28,19 @@ def made_up(
 
     The numbers are drawn at random, always the same ones: positive, progress below 1, stable times.
     """
-    pairs = [law if isinstance(law, tuple) else (law, "none") for law in laws]
+    pairs = [
+        contender if isinstance(contender, tuple) else (contender, "none")
+        for contender in contenders
+    ]
     cells = pd.MultiIndex.from_product(
         [range(len(pairs)), scenarios, plants, ["time"], seeds],
-        names=["law", "scenario", "plant", "reference", "seed"],
+        names=["contender", "scenario", "plant", "reference", "seed"],
     ).to_frame(index=False)
     table = pd.DataFrame(
         {
             "id": [f"{number:016x}" for number in range(len(cells))],
-            "formulation": [pairs[number][0] for number in cells["law"]],
-            "solver": [pairs[number][1] for number in cells["law"]],
+            "formulation": [pairs[number][0] for number in cells["contender"]],
+            "solver": [pairs[number][1] for number in cells["contender"]],
             **{name: cells[name] for name in ("scenario", "plant", "reference", "seed")},
             "status": "ok",
             "message": "",
@@ -45,9 +49,9 @@ def made_up(
     )
     random = np.random.default_rng(0)
     drawn = {name: random.lognormal(-4.0, 1.0, len(table)) for name in (*METRICS, *TIMES)}
-    table = table.assign(**drawn | {"timing_samples": 100, "timing_verdict": "stable"})
+    table = table.assign(**drawn | {"timing_samples": 100, "timing_stability": "stable"})
     table["progress_mean"] = table["progress_min"] = 1.0 - table["progress_mean"].clip(upper=1.0)
-    return table.assign(**{f"missed_{rate}_hz_share": 0.0 for rate in RATES})
+    return with_selected(table.assign(**{f"missed_{rate}_hz_share": 0.0 for rate in RATES}))
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ import pytest
 from dikbench.errors import DikbenchError
 from dikbench.metrics import METRICS
 from dikbench.report.write import write_report
-from dikbench.results.lenient_reading import read_results
+from dikbench.results.reading import read_results
 from dikbench.run.runner import RunSettings, run_study
 from dikbench.study.study import Selection, load_study, select
 
@@ -22,7 +22,7 @@ WriteResults = Callable[..., Path]
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a run of two laws, with its store."""
+    """The folder of a run of two formulations, with its store."""
     out = tmp_path_factory.mktemp("run") / "out"
     selection = Selection(
         formulations=("pinv", "qp"), scenarios=("reach[duration=0.2]",), plants=("ideal",)
@@ -151,7 +151,7 @@ def test_rows_of_an_older_dikbench_are_read(
     tmp_path: Path, make_rows: MakeRows, write_results: WriteResults
 ) -> None:
     """Columns that are not there are named and stay empty; columns that are too many do no harm."""
-    rows = make_rows({"pinv": {}}).drop(columns=["sigma_min", "timing_verdict"])
+    rows = make_rows({"pinv": {}}).drop(columns=["sigma_min", "timing_stability"])
     folder = write_results(tmp_path / "out", rows.assign(unheard_of=1))
     found = read_results(folder)
     assert set(METRICS) <= set(found.trials.columns)

@@ -19,8 +19,9 @@ from dikbench.errors import DikbenchError
 from dikbench.results.folder import ResultsFolder
 from dikbench.results.store import Store
 from dikbench.run.runner import RunSettings, run_study, status_of, time_study
-from dikbench.study.identity import cell_id, trial_id
-from dikbench.study.study import Cells, Study, TimingSettings, expand
+from dikbench.study.identity import timing_id, trial_id
+from dikbench.study.plan import expand
+from dikbench.study.study import Cells, Study, TimingSettings
 from dikbench.study.trial import Trial
 
 STUDY = Study(
@@ -31,7 +32,7 @@ STUDY = Study(
     name="short",
 )
 TIMELESS = ["wall_time_s", "control_time_s", "environment", "run"]
-TRIAL = Trial("dls", "reach", "none", "ideal", "time", 0)
+TRIAL = Trial.of("dls", "reach", "none", "ideal", "time", 0)
 
 
 def table(folder: Path) -> pd.DataFrame:
@@ -81,7 +82,7 @@ def test_the_same_trial_has_the_same_id_however_it_is_spelt() -> None:
         trial_id(replace(TRIAL, formulation="qp", solver="daqp[preset=high]")),
     ]
     assert len({*same, *other}) == 1 + len(other)
-    assert cell_id("dls", "none", "reach") == cell_id("dls[damping=0.05]", "none", "reach")
+    assert timing_id("dls", "none", "reach") == timing_id("dls[damping=0.05]", "none", "reach")
 
 
 def test_the_same_command_runs_only_what_is_missing(undisturbed: Path) -> None:
@@ -97,25 +98,25 @@ def test_a_changed_study_adds_and_never_deletes(tmp_path: Path) -> None:
     run_study(small, tmp_path, RunSettings(jobs=1), "first")
     other = msgspec.structs.replace(small, cells=(Cells(("pinv",)),))
     run_study(other, tmp_path, RunSettings(jobs=1), "second")
-    laws = list(ResultsFolder(tmp_path).read()[0]["formulation"])
-    assert laws == ["pinv", "dls", "pinv[after=clip]"]
+    formulations = list(ResultsFolder(tmp_path).read()[0]["formulation"])
+    assert formulations == ["pinv", "dls", "pinv[after=clip]"]
     assert status_of(tmp_path) == {"ok": 1}
 
 
 def test_a_changed_law_is_run_again_and_its_old_row_is_not_shown(tmp_path: Path) -> None:
-    """A law is what its source says: another source is another trial."""
+    """A formulation is what its source says: another source is another trial."""
     source = (
         "from dataclasses import dataclass\nimport numpy as np\n\n"
         "@dataclass(frozen=True)\nclass Still:\n    def velocity(self, problem, solve):\n"
         "        return np.full(problem.robot.nv, {})\n"
     )
-    law = tmp_path / "still_law.py"
+    formulation = tmp_path / "still_law.py"
     script = "import sys; from dikbench.cli import main; sys.argv = sys.argv[:1] + {!r}; main()"
     speeds = []
     for value in (0.0, 1e-3):
-        law.write_text(source.format(value))
+        formulation.write_text(source.format(value))
         arguments = [
-            "run", "--formulation", f"{law}:Still", "--scenario", "reach[duration=0.1]",
+            "run", "--formulation", f"{formulation}:Still", "--scenario", "reach[duration=0.1]",
             "--plant", "ideal", "--jobs", "1", "--out", str(tmp_path / "out"),
         ]  # fmt: skip
         subprocess.run(
@@ -134,7 +135,7 @@ def test_a_changed_law_is_run_again_and_its_old_row_is_not_shown(tmp_path: Path)
     [("", 0), ("failed", 1), ("dls", 2), ("reach", 3), ("daqp[interface=warm]", 2), ("all", 6)],
 )
 def test_rerun_chooses_what_is_run_again(tmp_path: Path, rerun: str, again: int) -> None:
-    """Failed trials, those of a law, scenario or solver, or all."""
+    """Failed trials, those of a formulation, scenario or solver, or all."""
     run_study(STUDY, tmp_path, RunSettings(jobs=2), "first")
     with Store(tmp_path / "results.sqlite") as store:
         row = store.trials().iloc[0].to_dict()

@@ -78,7 +78,7 @@ def test_every_column_has_a_unit_and_a_definition(committed: Path) -> None:
     assert list(units) == list(definitions) == list(trials.columns)
     assert all(definitions.values())
     assert all(units[name] == metric.unit for name, metric in METRICS.items())
-    assert units["law_time_median_us"] == "us"
+    assert units["formulation_time_median_us"] == "us"
     assert all(text.isascii() for text in units.values())
 
 

@@ -21,7 +21,7 @@ from dikbench.run.runner import RunSettings, run_study, status_of
 from dikbench.study.study import Cells, Study
 
 STUDY = Study(
-    description="laws with a solver and without, clocks and paths, noise, laps, a skipped cell",
+    description="with a solver and without, clocks and paths, noise, laps, a skipped cell",
     cells=(Cells(("dls", "oracle")), Cells(("qp",), ("daqp[interface=warm]",))),
     scenarios=("reach[duration=0.2]", "speed-sweep[laps=1,speed=2]"),
     plants=("ideal", "saturating[noise=1e-4,delay=2]"),
@@ -82,7 +82,7 @@ class Harmed:
         ids: of the trials that moved.
         bad: of those whose trace was cut, emptied, or swapped for another one.
         gone: of the one whose trace was removed.
-        other: of the one whose law is said to have been another one.
+        other: of the one whose formulation is said to have been another one.
     """
 
     folder: Path
@@ -151,7 +151,7 @@ def test_trials_that_cannot_be_recomputed_keep_their_values(harmed: Harmed) -> N
     number = len(harmed.ids) - 5
     assert str(harmed.done) == (
         f"{number} trials recomputed; left as they were: 1 without a trace, "
-        "1 whose law or scenario has changed since, 3 whose trace cannot be used"
+        "1 whose formulation or scenario has changed since, 3 whose trace cannot be used"
     )
 
 

@@ -13,7 +13,8 @@ from dikbench.metrics import METRICS
 from dikbench.report.write import write_report
 from dikbench.results.folder import ResultsFolder
 from dikbench.run.runner import RunSettings, run_study, run_trials
-from dikbench.study.study import Selection, expand, load_study, select
+from dikbench.study.plan import expand
+from dikbench.study.study import Selection, load_study, select
 
 UNEQUAL = ["wall_time_s", "control_time_s", "described"]
 """What may differ between two runs of the same trials."""
@@ -27,7 +28,7 @@ forked = []
 
 @dataclass(frozen=True)
 class Hostile:
-    """Does what a law must not."""
+    """Does what a formulation must not."""
 
     how: str = "raise"
 
@@ -84,7 +85,9 @@ def test_every_planned_trial_has_its_row(results: Path) -> None:
     assert not trials.duplicated(keys).any()
     oracles = 2 * 2  # scenarios and seeds: one plant, one reference mode
     assert len(trials) == 9 * 2 * 2 * 2 * 2 + oracles
-    assert {*keys, "status", *METRICS, "law_time_median_us", "law_time_p99_us"} <= {*trials.columns}
+    assert {*keys, "status", *METRICS, "formulation_time_median_us", "formulation_time_p99_us"} <= {
+        *trials.columns
+    }
 
 
 def test_cells_that_cannot_work_are_rows_that_say_why(results: Path) -> None:
@@ -101,21 +104,21 @@ def test_cells_that_cannot_work_are_rows_that_say_why(results: Path) -> None:
 
 
 def test_times_are_of_the_law_and_not_of_a_trial(results: Path) -> None:
-    """Times belong to formulation, solver and scenario; solving is part of the law's time."""
+    """Times belong to law, solver and scenario; solving is part of the law's time."""
     trials = pd.read_csv(results / "trials.csv")
-    law = trials["formulation"] != "oracle"
-    ran = trials[law & (trials["status"] == "ok") & (trials["seed"] == 0)]
-    per_cell = ran.groupby(["formulation", "solver", "scenario"])["law_time_median_us"]
+    formulation = trials["formulation"] != "oracle"
+    ran = trials[formulation & (trials["status"] == "ok") & (trials["seed"] == 0)]
+    per_cell = ran.groupby(["formulation", "solver", "scenario"])["formulation_time_median_us"]
     assert per_cell.nunique().eq(1).all()
     inside = ran["solver_core_time_median_us"] + ran["solver_wrapper_time_median_us"]
-    assert (inside <= ran["law_time_median_us"] * 1.5).all()
+    assert (inside <= ran["formulation_time_median_us"] * 1.5).all()
     assert (inside[ran["solver"] == "none"] == 0).all()
     assert (inside[ran["solver"] != "none"] > 0).all()
-    assert (ran["law_time_median_us"] <= ran["law_time_p99_us"]).all()
-    assert (ran["law_time_p99_us"] <= ran["law_time_p999_us"]).all()
-    assert (ran["law_time_p999_us"] <= ran["law_time_max_us"]).all()
+    assert (ran["formulation_time_median_us"] <= ran["formulation_time_p99_us"]).all()
+    assert (ran["formulation_time_p99_us"] <= ran["formulation_time_p999_us"]).all()
+    assert (ran["formulation_time_p999_us"] <= ran["formulation_time_max_us"]).all()
     assert (ran["missed_100_hz_share"] <= ran["missed_1000_hz_share"]).all()
-    assert ran["timing_verdict"].notna().all()
+    assert ran["timing_stability"].notna().all()
 
 
 def test_tables_figures_and_manifest_are_written(results: Path) -> None:
@@ -128,7 +131,7 @@ def test_tables_figures_and_manifest_are_written(results: Path) -> None:
     assert {
         "error_and_speed_against_time.svg",
         "off_course_against_slow_down.svg",
-        "time_per_law_and_solver.svg",
+        "time_per_formulation_and_solver.svg",
     } <= figures
     manifest = json.loads((results / "manifest.json").read_text())
     assert manifest["study"]["name"] == "smoke"
@@ -200,9 +203,9 @@ def test_a_hostile_law_ends_as_a_row_and_the_run_goes_on(
     write: Callable[[Path], str],
 ) -> None:
     """Whatever a law does, its trial is a row with its status and the others are untouched."""
-    law = write(tmp_path)
+    formulation = write(tmp_path)
     selection = Selection(
-        formulations=(f"{law}[how={how}]", "dls"), scenarios=("reach",), plants=("ideal",)
+        formulations=(f"{formulation}[how={how}]", "dls"), scenarios=("reach",), plants=("ideal",)
     )
     planned = expand(select(load_study("smoke"), selection, named=False))
     folder = ResultsFolder(tmp_path / "out")
@@ -218,7 +221,7 @@ def test_a_hostile_law_ends_as_a_row_and_the_run_goes_on(
 
 @pytest.fixture
 def write() -> Callable[[Path], str]:
-    """A function that writes the hostile law and returns its selector's name."""
+    """A function that writes the hostile formulation and returns its selector's name."""
 
     def to(folder: Path) -> str:
         path = folder / "hostile.py"
@@ -248,9 +251,9 @@ def test_a_harmless_oddity_of_a_law_changes_nothing(
     tmp_path: Path, how: str, write: Callable[[Path], str]
 ) -> None:
     """It ends as `ok`, and the rows beside it are those of a run without it."""
-    law = write(tmp_path)
+    formulation = write(tmp_path)
     tables = []
-    for number, formulations in enumerate(((f"{law}[how={how}]", "dls"), ("dls",))):
+    for number, formulations in enumerate(((f"{formulation}[how={how}]", "dls"), ("dls",))):
         selection = Selection(
             formulations=formulations, scenarios=("reach[duration=0.2]",), plants=("ideal",)
         )
@@ -259,7 +262,7 @@ def test_a_harmless_oddity_of_a_law_changes_nothing(
         folder.traces.mkdir(parents=True)
         found = run_trials(planned, folder, RunSettings(jobs=1, trial_timeout=60.0))
         tables.append({p.trial.formulation: row for p, row in found})
-    assert tables[0][f"{law}[how={how}]"]["status"] == "ok"
+    assert tables[0][f"{formulation}[how={how}]"]["status"] == "ok"
     beside, alone = (pd.DataFrame([table["dls"]]).drop(columns=UNEQUAL) for table in tables)
     pd.testing.assert_frame_equal(beside, alone, check_exact=True)
 
@@ -268,9 +271,9 @@ def test_a_law_that_hangs_is_not_timed_and_the_others_are(
     tmp_path: Path, write: Callable[[Path], str]
 ) -> None:
     """The run ends with its report: the timing pass has no limit for a single call."""
-    law = write(tmp_path)
+    formulation = write(tmp_path)
     selection = Selection(
-        formulations=(f"{law}[how=spin]", "dls"), scenarios=("reach[duration=0.2]",)
+        formulations=(f"{formulation}[how=spin]", "dls"), scenarios=("reach[duration=0.2]",)
     )
     study = select(load_study("smoke"), selection, named=False)
     run_study(study, tmp_path / "out", RunSettings(jobs=2, trial_timeout=4.0), "a test")

@@ -19,7 +19,8 @@ from dikbench.run.trial_row import run_trial
 from dikbench.scenario.oracle import ORACLE, follow, joint_oracle, oracle_motion, solve_placement
 from dikbench.scenario.reference.curves import circle
 from dikbench.simulation.status import Status
-from dikbench.study.study import Cells, Study, TimingSettings, expand
+from dikbench.study.plan import expand
+from dikbench.study.study import Cells, Study, TimingSettings
 from dikbench.study.trial import Trial
 
 MISS = "near-miss[robot=ur5,singularity=wrist,miss=0.02]"
@@ -29,7 +30,7 @@ def test_the_oracle_tracks_exactly_at_the_price_it_was_built_with() -> None:
     """No error, no loss of direction, full progress; its speed is the certificate's."""
     # At 0.5 ms: from sample to sample the motion is a chord, which leaves the tangent as dt.
     name = f"{MISS[:-1]},dt=5e-4]"
-    row = run_trial(Trial(ORACLE, name, "none", "ideal", "time", 0))
+    row = run_trial(Trial.of(ORACLE, name, "none", "ideal", "time", 0))
     assert row["status"] == "ok"
     assert row["position_error_max_m"] < 1e-9
     assert row["orientation_error_max_rad"] < 1e-9
@@ -43,14 +44,14 @@ def test_the_oracle_tracks_exactly_at_the_price_it_was_built_with() -> None:
 def test_the_oracle_of_a_limit_crossing_leaves_the_limits_as_deep_as_it_was_built() -> None:
     """The joint motion is known in closed form: its depth is the scenario's."""
     name = "joint-limit-crossing[robot=ur5,depth=0.15]"
-    row = run_trial(Trial(ORACLE, name, "none", "ideal", "time", 0))
+    row = run_trial(Trial.of(ORACLE, name, "none", "ideal", "time", 0))
     assert row["position_violation_max_rad"] == pytest.approx(0.15, rel=1e-3)
     assert row["position_error_max_m"] < 1e-9
 
 
 def test_a_scenario_without_a_motion_has_no_oracle() -> None:
     """A step has none: skipped, with the reason."""
-    row = run_trial(Trial(ORACLE, "reach", "none", "ideal", "time", 0))
+    row = run_trial(Trial.of(ORACLE, "reach", "none", "ideal", "time", 0))
     assert row["status"] == Status.SKIPPED.value
     assert "no joint motion" in row["message"]
 

@@ -159,7 +159,7 @@ def test_a_plant_that_means_the_same_is_the_same_trial() -> None:
     """A default that is spelt out changes no id; noise and delay do."""
 
     def name(plant: str) -> str:
-        return trial_id(Trial("dls", "reach", "none", plant, "time", 0))
+        return trial_id(Trial.of("dls", "reach", "none", plant, "time", 0))
 
     assert name("ideal") == name("ideal[noise=0]") == name("ideal[delay=0]")
     others = ("ideal", "ideal[noise=1e-4]", "ideal[delay=1]", "saturating")

@@ -82,7 +82,7 @@ def test_the_same_seed_gives_the_same_interval() -> None:
 
 
 def test_nan_counts_nowhere() -> None:
-    """The interval of a law with undefined trials is that of the study without them."""
+    """The interval of a formulation with undefined trials is that of the study without them."""
     families, scenarios = _balanced()
     values = _studies(1)
     missing = np.arange(len(values)) % SEEDS == 0
@@ -104,7 +104,7 @@ def test_no_interval_where_no_spread_was_seen(values: list[float]) -> None:
 
 
 def test_nothing_at_all_has_no_interval() -> None:
-    """No trials, and no laws, are no error."""
+    """No trials, and no formulations, are no error."""
     weights = draw_weights([], [])
     assert np.isnan(mean_intervals(np.empty((0, 2)), weights)).all()
     assert mean_intervals(np.empty((0, 0)), weights).shape == (0, 2)

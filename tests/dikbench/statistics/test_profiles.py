@@ -22,7 +22,7 @@ INF, NAN = np.inf, np.nan
 
 
 def test_two_laws_on_three_problems() -> None:
-    """By hand: each law wins once where both go, the second fails on the last problem."""
+    """By hand: each formulation wins once where both go, the second fails on the last problem."""
     costs = np.array([[1.0, 2.0], [3.0, 1.0], [2.0, INF]])
     ratios = performance_ratios(costs)
     np.testing.assert_array_equal(ratios, [[1.0, 2.0], [3.0, 1.0], [1.0, INF]])
@@ -92,10 +92,12 @@ def test_a_data_profile_counts_what_is_below_each_target() -> None:
 
 
 @given(COSTS, st.integers(0, 4))
-def test_a_data_profile_depends_on_no_other_law(errors: np.ndarray, law: int) -> None:
+def test_a_data_profile_depends_on_no_other_law(errors: np.ndarray, contender: int) -> None:
     """Unlike a performance profile; and it never falls."""
     targets = np.geomspace(1e-4, 1e4, 17)
-    law %= errors.shape[1]
+    contender %= errors.shape[1]
     shares = data_profile(errors, targets)
-    np.testing.assert_array_equal(shares[:, [law]], data_profile(errors[:, [law]], targets))
+    np.testing.assert_array_equal(
+        shares[:, [contender]], data_profile(errors[:, [contender]], targets)
+    )
     assert (np.diff(shares, axis=0) >= 0.0).all()

@@ -10,8 +10,9 @@ from dikbench.errors import DikbenchError
 from dikbench.plugins.registry import make_scenario
 from dikbench.selector import parse_selector
 from dikbench.study.identity import scenario_id
+from dikbench.study.plan import expand
 from dikbench.study.split import SPLITS
-from dikbench.study.study import Selection, Study, expand, load_study, select
+from dikbench.study.study import Selection, Study, load_study, select
 
 
 def test_the_splits_share_no_seed_and_neither_has_seed_zero() -> None:

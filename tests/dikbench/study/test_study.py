@@ -8,7 +8,8 @@ import pytest
 from dikbench.cli.listing import description
 from dikbench.errors import DikbenchError
 from dikbench.solvers.catalogue.back_ends import parse_solver
-from dikbench.study.study import Selection, Study, expand, load_study, select, shipped_studies
+from dikbench.study.plan import expand
+from dikbench.study.study import Selection, Study, load_study, select, shipped_studies
 
 MINIMAL = """
 description = "a study"
@@ -51,11 +52,19 @@ def test_every_shipped_study_expands_to_trials_with_distinct_ids(name: str) -> N
 
 
 def test_quick_covers_laws_families_and_solvers() -> None:
-    """The default study has five laws, the oracle, four families and six QP solvers."""
+    """The default study has five formulations, the oracle, four families and six QP solvers."""
     trials = [planned.trial for planned in expand(load_study("quick"))]
-    laws = {trial.formulation.partition("[")[0] for trial in trials}
+    formulations = {trial.formulation.partition("[")[0] for trial in trials}
     families = {trial.scenario.partition("[")[0] for trial in trials}
-    assert laws == {"oracle", "pinv", "dls", "nullspace", "qp", "lp-alpha", "lp-alpha-cvxpy"}
+    assert formulations == {
+        "oracle",
+        "pinv",
+        "dls",
+        "nullspace",
+        "qp",
+        "lp-alpha",
+        "lp-alpha-cvxpy",
+    }
     assert families == {"reach", "near-miss", "joint-limit-crossing", "speed-sweep"}
     solvers = [parse_solver(trial.solver) for trial in trials if trial.formulation == "qp"]
     assert len({solver.name for solver in solvers}) == 6
@@ -64,7 +73,7 @@ def test_quick_covers_laws_families_and_solvers() -> None:
 
 
 def test_a_law_without_solver_runs_once_whatever_solvers_are_named() -> None:
-    """Solvers multiply only the laws that need one."""
+    """Solvers multiply only the formulations that need one."""
     chosen = Selection(formulations=("dls", "qp"), solvers=("osqp", "daqp"))
     assert solvers_of(select(load_study("quick"), chosen, named=False)) == {
         "dls": ["none"],
@@ -147,7 +156,7 @@ def test_a_study_that_is_not_there_names_the_shipped_ones() -> None:
 
 
 def test_a_timing_reference_that_needs_a_solver_is_an_error(write_study: WriteStudy) -> None:
-    """The law whose problems are replayed must be one that needs no solver."""
+    """The formulation whose problems are replayed must be one that needs no solver."""
     path = write_study(MINIMAL + '[timing]\nreference = "qp"\n')
     with pytest.raises(DikbenchError, match="needs a solver"):
         expand(load_study(path))

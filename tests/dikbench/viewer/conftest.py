@@ -10,7 +10,7 @@ from dikbench.run.runner import RunSettings, run_study
 from dikbench.study.study import Cells, Study
 
 STUDY = Study(
-    description="an arm with meshes and one without, a fast law, a step without a path",
+    description="an arm with meshes and one without, a fast formulation, a step without a path",
     cells=(Cells(("pinv",)),),
     scenarios=(
         "speed-sweep[robot=planar3r,laps=1,speed=1.5]",

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from dikbench.report.figures.scenario import stick
+from dikbench.report.figures.scenario_drawing import stick
 from dikbench.robots.catalogue import ROBOTS, load_robot
 from dikbench.robots.example_robot_data import DataModel
 from dikbench.viewer.visuals import bodies, capsules

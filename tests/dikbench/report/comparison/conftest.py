@@ -24,11 +24,11 @@ MANIFEST = {
 
 
 def trials() -> pd.DataFrame:
-    """Two laws on three scenarios of two families, two seeds each; every metric is 0.5."""
+    """Two formulations on three scenarios of two families, two seeds each; every metric is 0.5."""
     rows = [
         {
-            "id": f"{law}-{scenario}-{seed}",
-            "formulation": law,
+            "id": f"{formulation}-{scenario}-{seed}",
+            "formulation": formulation,
             "solver": solver,
             "scenario": scenario,
             "plant": "ideal",
@@ -38,11 +38,11 @@ def trials() -> pd.DataFrame:
             "message": "",
             "steps": 100,
             **dict.fromkeys(METRICS, 0.5),
-            "law_time_median_us": 10.0,
-            "law_time_p99_us": 20.0,
-            "timing_verdict": "stable",
+            "formulation_time_median_us": 10.0,
+            "formulation_time_p99_us": 20.0,
+            "timing_stability": "stable",
         }
-        for law, solver in (("dls", "none"), ("qp", "daqp"))
+        for formulation, solver in (("dls", "none"), ("qp", "daqp"))
         for scenario in ("reach", "near-miss[miss=0.1]", "near-miss[miss=0.2]")
         for seed in (0, 1)
     ]

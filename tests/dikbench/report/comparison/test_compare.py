@@ -50,7 +50,7 @@ def test_a_store_does_not_differ_from_its_exports(tmp_path: Path) -> None:
     for name in ("trials.csv", "manifest.json"):
         shutil.copy(tmp_path / "a" / name, tmp_path / "b")
     found = compare(tmp_path / "a", tmp_path / "b")
-    assert found.laws.empty
+    assert found.formulations.empty
     assert found.trials().empty
     assert len(found.matched.a) == 4
 
@@ -115,9 +115,9 @@ def test_undefined_on_one_side_is_a_change(folder: Callable[..., Path]) -> None:
         table.loc[0, "sigma_min"] = np.nan
 
     a, b, c = folder("a"), folder("b", lose), folder("c", lose)
-    assert compare(b, c).laws.empty
+    assert compare(b, c).formulations.empty
     lost, found = compare(a, b), compare(b, a)
-    assert (lost.laws["worse"].item(), found.laws["worse"].item()) == (1, 0)
+    assert (lost.formulations["worse"].item(), found.formulations["worse"].item()) == (1, 0)
     assert "undefined" in lines_of(dikbench(a, b))[0]
     assert dikbench(a, b, "--tolerance", "sigma_min=1e6%").exit_code == 1
     assert dikbench(b, a, "--tolerance", "sigma_min=0").exit_code == 0
@@ -164,11 +164,11 @@ def test_trials_of_one_folder_are_counted_and_named(folder: Callable[..., Path])
 
 def test_columns_of_other_versions(folder: Callable[..., Path]) -> None:
     """What one side lacks is said, not compared, and no tolerance can be put on it."""
-    a = folder("a", lambda table: table.drop(columns=["sigma_min", "timing_verdict"]))
+    a = folder("a", lambda table: table.drop(columns=["sigma_min", "timing_stability"]))
     b = folder("b", lambda table: table.assign(metric_of_tomorrow=1.0))
     result = dikbench(a, b)
     assert result.exit_code == 0
-    assert "B has metric_of_tomorrow, sigma_min, timing_verdict, which A lacks." in result.output
+    assert "B has metric_of_tomorrow, sigma_min, timing_stability, which A lacks." in result.output
     assert "## Times" not in result.output
     wrong = dikbench(a, b, "--tolerance", "sigma_min=1")
     assert wrong.exit_code == 2

@@ -23,7 +23,7 @@ def test_differences_by_hand(folder: Callable[..., Path]) -> None:
     def change(table: pd.DataFrame) -> None:
         table.loc[:3, "position_error_max_m"] = [0.5, 0.8, 0.3, 0.9]
 
-    row = compare(folder("a"), folder("b", change)).laws.iloc[0]
+    row = compare(folder("a"), folder("b", change)).formulations.iloc[0]
     assert (row["formulation"], row["metric"]) == ("dls", "position_error_max_m")
     assert (row["trials"], row["worse"], row["better"]) == (6, 2, 1)
     assert row["mean_a"] == pytest.approx(0.5)
@@ -41,8 +41,8 @@ def test_intervals_hold_a_constant_shift(folder: Callable[..., Path]) -> None:
         noise = 1e-9 * np.arange(len(table))
         return table.assign(orientation_error_max_rad=0.6 + noise)
 
-    laws = compare(folder("a"), folder("b", shift)).laws
-    np.testing.assert_allclose(laws[["low", "high"]], 0.1, atol=1e-7)
+    formulations = compare(folder("a"), folder("b", shift)).formulations
+    np.testing.assert_allclose(formulations[["low", "high"]], 0.1, atol=1e-7)
 
 
 @pytest.mark.parametrize(
@@ -71,10 +71,10 @@ def test_times_are_ratios_with_their_doubts(folder: Callable[..., Path]) -> None
 
     def slow(table: pd.DataFrame) -> None:
         dls = table["formulation"].eq("dls")
-        table.loc[dls & table["scenario"].eq("reach"), "law_time_median_us"] = 20.0
-        table.loc[dls & table["scenario"].str.contains("0.2"), "law_time_median_us"] = 5.0
-        table.loc[dls & table["scenario"].eq("reach"), "timing_verdict"] = "drift: much"
-        table["law_time_p99_us"] = 60.0
+        table.loc[dls & table["scenario"].eq("reach"), "formulation_time_median_us"] = 20.0
+        table.loc[dls & table["scenario"].str.contains("0.2"), "formulation_time_median_us"] = 5.0
+        table.loc[dls & table["scenario"].eq("reach"), "timing_stability"] = "drift: much"
+        table["formulation_time_p99_us"] = 60.0
 
     result = compare(folder("a"), folder("b", slow, cpu="two cores"))
     dls, qp = result.times.to_dict("records")
@@ -84,7 +84,7 @@ def test_times_are_ratios_with_their_doubts(folder: Callable[..., Path]) -> None
     text = render(result)
     assert "The machines differ" in text
     assert "1 were not stable" in text
-    assert result.laws.empty
+    assert result.formulations.empty
 
 
 def test_versions_are_shown(folder: Callable[..., Path]) -> None:
@@ -124,10 +124,10 @@ def test_better_is_the_registry_s_business(folder: Callable[..., Path]) -> None:
     same = folder("same")
     assert compare(same, less, [parse_tolerance("progress_mean=0.05")]).regressed
     assert not compare(same, more, [parse_tolerance("progress_mean=0.05")]).regressed
-    laws = compare(same, less).laws
-    assert list(laws["worse"]) == [6, 6]
-    assert list(compare(same, more).laws["better"]) == [6, 6]
-    np.testing.assert_allclose(laws["mean_difference"], -0.1)
+    formulations = compare(same, less).formulations
+    assert list(formulations["worse"]) == [6, 6]
+    assert list(compare(same, more).formulations["better"]) == [6, 6]
+    np.testing.assert_allclose(formulations["mean_difference"], -0.1)
 
 
 def test_the_readme_s_tolerances() -> None:

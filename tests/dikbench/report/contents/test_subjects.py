@@ -8,8 +8,8 @@ import pytest
 
 from dikbench.plugins.registry import make_scenario, plugins
 from dikbench.report.contents.docstring import parse_docstring
-from dikbench.report.contents.laws_and_families import families_of, laws_of
-from dikbench.report.sentences.situations import (
+from dikbench.report.contents.formulations_and_families import families_of, formulations_of
+from dikbench.report.selection.situations import (
     AT_LIMITS,
     CONSTRAINED,
     FREE,
@@ -24,11 +24,11 @@ from dikbench.report.sentences.situations import (
 
 MakeRows = Callable[..., pd.DataFrame]
 
-LAW = '''
+FORMULATION = '''
 raise SystemExit("this file was run")
 
 class Mine:
-    """A law of mine: slowly.
+    """A formulation of mine: slowly.
 
         v = gain J^T V
 
@@ -50,25 +50,25 @@ class Mine:
 def test_a_law_given_as_a_file_is_read_and_not_run(tmp_path: Path, make_rows: MakeRows) -> None:
     """Results name files; remaking a report takes the docstring from them and executes nothing."""
     file = tmp_path / "mine.py"
-    file.write_text(LAW)
-    [law] = laws_of(make_rows({f"{file}:Mine[gain=2]": {}}))
-    assert law.text is not None
-    assert law.text.summary == "A law of mine: slowly."
-    assert law.text.titled == {"Source": "[Mine2026]"}
-    assert law.text.entries == {"gain": "how much [rad/m], and more."}
-    assert law.variants[0].attributes == {"gain": "2", "after": "'clip'"}
+    file.write_text(FORMULATION)
+    [formulation] = formulations_of(make_rows({f"{file}:Mine[gain=2]": {}}))
+    assert formulation.text is not None
+    assert formulation.text.summary == "A formulation of mine: slowly."
+    assert formulation.text.titled == {"Source": "[Mine2026]"}
+    assert formulation.text.entries == {"gain": "how much [rad/m], and more."}
+    assert formulation.variants[0].attributes == {"gain": "2", "after": "'clip'"}
 
 
 @pytest.mark.parametrize("content", [None, "", "def f(", "\x00", "class Other: pass"])
 def test_a_law_whose_file_says_nothing_is_named_all_the_same(
     tmp_path: Path, make_rows: MakeRows, content: str | None
 ) -> None:
-    """A file that is gone, empty or no Python leaves the law without a text."""
+    """A file that is gone, empty or no Python leaves the formulation without a text."""
     if content is not None:
         (tmp_path / "mine.py").write_text(content)
-    [law] = laws_of(make_rows({f"{tmp_path / 'mine.py'}:Mine": {}}))
-    assert law.text is None
-    assert law.name.endswith("mine.py:Mine")
+    [formulation] = formulations_of(make_rows({f"{tmp_path / 'mine.py'}:Mine": {}}))
+    assert formulation.text is None
+    assert formulation.name.endswith("mine.py:Mine")
 
 
 def test_variants_of_a_law_stand_together_with_every_attribute(make_rows: MakeRows) -> None:
@@ -82,7 +82,7 @@ def test_variants_of_a_law_stand_together_with_every_attribute(make_rows: MakeRo
             "unheard-of": {},
         }
     )
-    qp, unheard_of, oracle = laws_of(rows)
+    qp, unheard_of, oracle = formulations_of(rows)
     assert [variant.selector for variant in qp.variants] == ["qp", "qp[damping=0.1]"]
     assert qp.variants[0].solvers == ("daqp", "osqp")
     assert [variant.attributes["damping"] for variant in qp.variants] == ["0.001", "0.1"]

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from dikbench.report.drawing.labels import label_points
 from dikbench.report.drawing.style import style
 from dikbench.report.figures.error_and_time import cost_points, draw_error_and_time
-from dikbench.report.figures.pareto import draw_off_course_and_slow_down, front, law_points
+from dikbench.report.figures.pareto import contender_points, draw_off_course_and_slow_down, front
 from dikbench.report.figures.time_split import PARTS, draw_time_split, time_parts
 from dikbench.report.selection.rows import that_ran
 
@@ -39,14 +39,14 @@ def test_points_of_off_course_and_slow_down(
 ) -> None:
     """A point is the mean over the scenarios; a law that violates is hollow and off the front."""
     trials = make_trials(["slow", "wide", "both", "violating", "slower"], SCENARIOS)
-    law = trials["formulation"]
-    trials["progress_mean"] = law.map(
+    contender = trials["formulation"]
+    trials["progress_mean"] = contender.map(
         {"slow": 0.5, "wide": 1.0, "both": 0.4, "violating": 1.0, "slower": 0.1}
     )
     trials["off_course_max_rad"] = np.radians(
-        law.map({"slow": 1e-9, "wide": 90.0, "both": 90.0, "violating": 0.0, "slower": 0.0})
+        contender.map({"slow": 1e-9, "wide": 90.0, "both": 90.0, "violating": 0.0, "slower": 0.0})
     )
-    trials["violating_share"] = law.eq("violating") * 0.1
+    trials["violating_share"] = contender.eq("violating") * 0.1
     trials.loc[0, "progress_mean"] = 0.2
     with style():
         (figure,) = draw_off_course_and_slow_down(trials, target)
@@ -64,7 +64,7 @@ def test_a_failed_trial_counts_worst(make_trials: MakeTrials) -> None:
     """A trial that failed is 180 deg off course and makes none of the motion."""
     trials = make_trials(["dls"], SCENARIOS).assign(off_course_max_rad=0.0, progress_mean=1.0)
     trials.loc[0, "status"] = "diverged"
-    points = law_points(trials)
+    points = contender_points(trials)
     assert points.loc["dls", "off_course"] == 60.0
     assert round(points.loc["dls", "slow_down"], 6) == 33.333333
 
@@ -75,11 +75,13 @@ def test_error_against_time_is_a_point_per_law_and_solver(
     """Medians over the timed scenarios, one point per law and solver, hollow where unstable."""
     trials = make_trials(["dls", ("qp", "daqp"), ("qp", "osqp")], SCENARIOS)
     trials = that_ran(trials.drop(columns="contour_error_rms_m", errors="ignore"))
-    trials.loc[trials["solver"].eq("osqp"), "timing_verdict"] = "drift: of the machine"
-    trials.loc[trials["scenario"].eq("step"), "law_time_p99_us"] = np.nan
+    trials.loc[trials["solver"].eq("osqp"), "timing_stability"] = "drift: of the machine"
+    trials.loc[trials["scenario"].eq("step"), "formulation_time_p99_us"] = np.nan
     points = cost_points(trials)
-    timed = trials[trials["scenario"].ne("step")].groupby("law")
-    np.testing.assert_allclose(points["time"], timed["law_time_p99_us"].median()[points.index])
+    timed = trials[trials["scenario"].ne("step")].groupby("contender")
+    np.testing.assert_allclose(
+        points["time"], timed["formulation_time_p99_us"].median()[points.index]
+    )
     np.testing.assert_allclose(
         points["error"], 1e3 * timed["position_error_rms_m"].median()[points.index]
     )
@@ -107,10 +109,10 @@ def test_bars_are_the_parts_of_a_step(
     with style():
         draw_time_split(trials, target)
     assert len(drawn[0].axes) == 2
-    for axis, law in zip(drawn[0].axes, ("dls", "qp, daqp"), strict=True):
-        assert [label.get_text() for label in axis.get_yticklabels()] == [law]
+    for axis, contender in zip(drawn[0].axes, ("dls", "qp, daqp"), strict=True):
+        assert [label.get_text() for label in axis.get_yticklabels()] == [contender]
         widths = [bar.get_width() for bar in axis.patches]
-        np.testing.assert_allclose(widths, table.loc[law, list(PARTS)].astype(float))
+        np.testing.assert_allclose(widths, table.loc[contender, list(PARTS)].astype(float))
         starts = [bar.get_x() for bar in axis.patches]
         np.testing.assert_allclose(starts, np.cumsum([0.0, *widths[:-1]]))
 

@@ -31,8 +31,8 @@ KINDS = {
     "peak_speed_against_miss_1.svg",
     "off_course_against_slow_down.svg",
     "law_dls_damping_1.svg",
-    "error_against_time_per_law.svg",
-    "time_per_law_and_solver.svg",
+    "error_against_time_per_formulation.svg",
+    "time_per_formulation_and_solver.svg",
 }
 
 
@@ -122,7 +122,7 @@ def _huge(trials: pd.DataFrame) -> pd.DataFrame:
     return trials.assign(**dict.fromkeys((*METRICS, *TIMES), 1e200))
 
 
-TIMED = {"error_against_time_per_law.svg", "time_per_law_and_solver.svg"}
+TIMED = {"error_against_time_per_formulation.svg", "time_per_formulation_and_solver.svg"}
 OUTCOME = {"phase_diagram_1_outcome.svg"}
 
 
@@ -133,7 +133,7 @@ OUTCOME = {"phase_diagram_1_outcome.svg"}
         (_skipped, set()),
         (_one_law, KINDS - {"law_dls_damping_1.svg"}),
         (_one_trial, {*TIMED, "off_course_against_slow_down.svg"}),
-        (_failed, {*OUTCOME, "time_per_law_and_solver.svg"}),
+        (_failed, {*OUTCOME, "time_per_formulation_and_solver.svg"}),
         (_only_saturating, KINDS),
         (_untimed, KINDS - TIMED),
         (_without_numbers, OUTCOME),
@@ -159,16 +159,16 @@ HOSTILE = [
     "a\"b&c'd",
     "$x^{$",
     "\N{CJK UNIFIED IDEOGRAPH-540D}\x07\n",
-    "law</svg>",
+    "formulation</svg>",
     "_hidden",
 ]
 
 
 def test_hostile_names_stay_text(make_trials: MakeTrials, tmp_path: Path) -> None:
     """Names that are markup, paths or formulas are written as they are, and in no file name."""
-    laws = [f"{HOSTILE[0]}[../p<={value}]" for value in (1, 2, 3)] + HOSTILE[1:]
+    formulations = [f"{HOSTILE[0]}[../p<={value}]" for value in (1, 2, 3)] + HOSTILE[1:]
     scenarios = [f"{HOSTILE[1]}[<b>/../={value}]" for value in (1, 2, 3)]
-    figures = drawn_in(tmp_path, make_trials(laws, scenarios))
+    figures = drawn_in(tmp_path, make_trials(formulations, scenarios))
     assert any("law_" in figure.file for figure in figures)
     written = ""
     for figure in figures:
@@ -177,14 +177,14 @@ def test_hostile_names_stay_text(make_trials: MakeTrials, tmp_path: Path) -> Non
         tags = {element.tag.rpartition("}")[2] for element in root.iter()}
         assert not tags & {"script", "a", "b", "foreignObject"}
         written += "\n".join(root.itertext())
-    for name in (laws[0], *HOSTILE[1:4]):
+    for name in (formulations[0], *HOSTILE[1:4]):
         assert short(name) in written
 
 
 @pytest.mark.parametrize(
     ("parts", "name"),
     [
-        (("law", "../../etc/passwd", 1), "law_etc-passwd_1"),
+        (("formulation", "../../etc/passwd", 1), "law_etc-passwd_1"),
         (("<script>",), "script"),
         (("a/b\\c\0d", "", 2), "a-b-c-d_2"),
         (("x" * 300,), "x" * 40),

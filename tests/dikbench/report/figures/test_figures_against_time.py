@@ -31,19 +31,19 @@ LAWS = ["pinv", "pinv[after=clip]", "dls"]
 
 @pytest.fixture(scope="module")
 def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A results folder that holds the traces of three laws and no more."""
+    """A results folder that holds the traces of three formulations and no more."""
     folder = tmp_path_factory.mktemp("results")
     (folder / "traces").mkdir()
     scenario = make_scenario(CROSSING)
-    for number, law in enumerate(LAWS):
-        run = simulate(scenario, make_formulation(law), make_solve(None, None), Plant())
+    for number, formulation in enumerate(LAWS):
+        run = simulate(scenario, make_formulation(formulation), make_solve(None, None), Plant())
         run.trace.save(folder / "traces" / f"{number:016x}.arrow")
     return folder
 
 
 @pytest.fixture
 def trials(make_trials: MakeTrials) -> pd.DataFrame:
-    """The rows of the three laws, and of a fourth whose trace was not kept."""
+    """The rows of the three formulations, and of a fourth whose trace was not kept."""
     return make_trials([*LAWS, "sdls"], [CROSSING])
 
 
@@ -54,7 +54,7 @@ def curves(axes: Any) -> dict[str, Any]:
 
 
 def motion_of(folder: Path, number: int) -> Motion:
-    """The stored motion of a law."""
+    """The stored motion of a formulation."""
     trace = Trace.load(folder / "traces" / f"{number:016x}.arrow")
     return recompute(trace, make_scenario(CROSSING))
 
@@ -69,12 +69,12 @@ def test_errors_and_speeds_are_those_of_the_motion(
     errors = columns["position error [mm]"]
     speeds = columns["largest joint speed over limit"]
     assert errors.keys() == speeds.keys() == set(LAWS)
-    for number, law in enumerate(LAWS):
+    for number, formulation in enumerate(LAWS):
         motion = motion_of(stored, number)
         limit = motion.scenario.robot.limits.velocity
         assert limit is not None
-        assert errors[law].get_ydata().max() == 1e3 * motion.position_error.max()
-        assert speeds[law].get_ydata().max() == limit.usage(motion.trace.applied).max()
+        assert errors[formulation].get_ydata().max() == 1e3 * motion.position_error.max()
+        assert speeds[formulation].get_ydata().max() == limit.usage(motion.trace.applied).max()
     assert (target / figure.file).stat().st_size < 100_000
 
 
@@ -91,8 +91,10 @@ def test_the_contour_error_stands_beside_it_where_there_is_a_path(
     with style():
         draw_time_series(ResultsFolder(stored), trials, CROSSING, target)
     errors, contours, _ = (curves([axis]) for axis in drawn[0].axes[:3])
-    for law in LAWS:
-        assert 0.5 * errors[law].get_ydata().max() == contours[law].get_ydata().max()
+    for formulation in LAWS:
+        assert (
+            0.5 * errors[formulation].get_ydata().max() == contours[formulation].get_ydata().max()
+        )
 
 
 def test_margins_are_distances_to_the_nearest_limit(
@@ -104,10 +106,10 @@ def test_margins_are_distances_to_the_nearest_limit(
         (figure,) = draw_joint_margins(ResultsFolder(stored), trials, "reach", target)
     shown = curves(drawn[0].axes)
     assert shown.keys() == set(LAWS)
-    for number, law in enumerate(LAWS):
+    for number, formulation in enumerate(LAWS):
         margin = joint_margin(motion_of(stored, number))
-        assert shown[law].get_ydata().min() == margin.min() < 0.0
-        assert shown[law].get_ydata()[0] == margin[0] > 0.0
+        assert shown[formulation].get_ydata().min() == margin.min() < 0.0
+        assert shown[formulation].get_ydata()[0] == margin[0] > 0.0
     assert (target / figure.png).is_file()
 
 

@@ -13,8 +13,8 @@ from matplotlib.collections import QuadMesh
 
 from dikbench.report.drawing.style import style
 from dikbench.report.figures.phase_diagram import draw_phase_diagrams, three_digits
+from dikbench.report.selection.categories import CATEGORIES, categories
 from dikbench.report.selection.near_miss_grids import near_miss_grids
-from dikbench.report.selection.outcomes import OUTCOMES, outcomes
 
 MakeTrials = Callable[..., pd.DataFrame]
 
@@ -49,8 +49,8 @@ def test_cells_hold_what_the_table_says(
     ):
         panels = {axis.get_title(): axis for axis in figure.axes if axis.get_title()}
         assert panels.keys() == {"dls", "pinv"}
-        for law, axis in panels.items():
-            wanted = np.array([scale * by_cell.loc[(law, name), column] for name in GRID])
+        for formulation, axis in panels.items():
+            wanted = np.array([scale * by_cell.loc[(formulation, name), column] for name in GRID])
             wanted = wanted.reshape(len(MISSES), len(SPEEDS)).T
             np.testing.assert_allclose(cells(axis), wanted)
             assert [text.get_text() for text in axis.texts] == [
@@ -65,7 +65,7 @@ def test_the_worst_that_applies_is_the_outcome(make_trials: MakeTrials) -> None:
     trials["violating_share"] = [0.5, 0.5, 0.0, 0.0, 0.0, np.nan]
     trials["off_course_max_rad"] = [1.0, 1.0, 1.0, 0.0, 0.0, np.nan]
     trials["progress_min"] = [0.0, 0.0, 0.0, 0.5, 1.0, np.nan]
-    named = [OUTCOMES[code] for code in outcomes(trials)]
+    named = [CATEGORIES[code] for code in categories(trials)]
     assert named == ["failed", "violating", "off course", "slow", "ok", "ok"]
 
 
@@ -85,7 +85,7 @@ def test_a_failed_trial_is_black_and_a_missing_one_blank(
     assert np.isnan(failed[1, 2])
     assert np.isfinite(shown).sum() == 4
     assert np.isfinite(failed).sum() == 1
-    assert cells(drawn[2].axes[0])[0, 0] == OUTCOMES.index("failed")
+    assert cells(drawn[2].axes[0])[0, 0] == CATEGORIES.index("failed")
 
 
 def test_laws_stand_in_the_order_of_how_they_do(
@@ -93,11 +93,11 @@ def test_laws_stand_in_the_order_of_how_they_do(
 ) -> None:
     """The oracle first, a law that keeps the limits before one that does not, then by the error."""
     trials = make_trials(["violating", "far", "near", "oracle"], GRID)
-    law = trials["formulation"]
-    trials["violating_share"] = law.eq("violating") * 1.0
+    formulation = trials["formulation"]
+    trials["violating_share"] = formulation.eq("violating") * 1.0
     trials["off_course_max_rad"] = 0.0
     trials["progress_min"] = 1.0
-    trials["position_error_rms_m"] = law.map(
+    trials["position_error_rms_m"] = formulation.map(
         {"violating": 0.0, "near": 1e-3, "far": 1e-2, "oracle": 1.0}
     )
     trials = trials.drop(columns="contour_error_rms_m", errors="ignore")
@@ -117,8 +117,8 @@ def test_a_row_of_near_misses_is_no_grid(make_trials: MakeTrials) -> None:
 def test_many_laws_make_several_pages(
     make_trials: MakeTrials, drawn: list[Any], target: Path
 ) -> None:
-    """21 laws are in two figures of about as many panels, and no law is left out."""
-    names = [f"law-{number}" for number in range(21)]
+    """21 formulations are in two figures of about as many panels, and none is left out."""
+    names = [f"formulation-{number}" for number in range(21)]
     with style():
         figures = draw_phase_diagrams(make_trials(names, GRID[:4]), target)
     errors = [

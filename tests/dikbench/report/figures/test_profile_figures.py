@@ -17,16 +17,17 @@ from dikbench.report.selection.rows import LEAST_ERROR
 INF = np.inf
 
 
-def _trials(laws: dict[str, list[float]], **columns: list[str]) -> pd.DataFrame:
+def _trials(contenders: dict[str, list[float]], **columns: list[str]) -> pd.DataFrame:
     """A trial per law and scenario with its contour error; infinite: it failed, None: skipped."""
     rows = []
-    for law, errors in laws.items():
+    for contender, errors in contenders.items():
         for number, error in enumerate(errors):
             status = "skipped" if error is None else "diverged" if error == INF else "ok"
             recorded = error if status == "ok" else 1e-9  # what a failure recorded is no use
             rows.append(
                 {
-                    "formulation": law, "solver": "none", "scenario": f"reach[number={number}]",
+                    "formulation": contender, "solver": "none",
+                    "scenario": f"reach[number={number}]",
                     "plant": "ideal", "reference": "path", "seed": 0, "status": status,
                     "steps": 0 if status == "skipped" else 10,
                     "contour_error_rms_m": recorded, "contour_error_max_m": recorded,
@@ -59,7 +60,7 @@ def test_failures_and_skips_are_problems_not_solved() -> None:
     """Whatever a failed trial recorded; errors below the least count as equal."""
     trials = _trials({"a": [1e-3, INF, 1e-9], "b": [2e-3, 1e-2, 1e-8], "c": [None, 1e-2, INF]})
     costs = Costs.of(trials[trials["status"] != "skipped"], "rms", late=False)
-    assert costs.laws == ["a", "b", "c"]
+    assert costs.contenders == ["a", "b", "c"]
     assert costs.words == "rms contour error"
     expected = [[1e-3, 2e-3, INF], [INF, 1e-2, 1e-2], [LEAST_ERROR, LEAST_ERROR, INF]]
     np.testing.assert_array_equal(costs.errors, expected)
@@ -107,8 +108,8 @@ def test_the_curves_are_the_profiles(drawn: dict[str, matplotlib.figure.Figure])
             "data_profiles.svg",
         ]
         whole, against_b, against_c = drawn["performance_profiles_1"].axes
-    for law, heights in {"a": (1, 1, 1), "b": (0, 0, 1), "c": (0, 0, 1)}.items():
-        points = _line(whole, law)
+    for contender, heights in {"a": (1, 1, 1), "b": (0, 0, 1), "c": (0, 0, 1)}.items():
+        points = _line(whole, contender)
         for factor, height in zip((1.0, 1.9, 9.5), heights, strict=True):
             assert np.interp(factor, *points.T) == pytest.approx(height)
     assert {axis.get_title() for axis in (against_b, against_c)} == {"b", "c"}
@@ -135,7 +136,7 @@ def test_plants_and_reference_modes_have_pictures_of_their_own(
     """A performance profile each; the data profiles side by side, a law in one colour in all."""
     one = _trials({"a": [1e-3, 2e-3], "b": [2e-3, 1e-3]})
     two = one.assign(plant="saturating")
-    three = one[one["formulation"] == "a"].assign(plant="a plant of one law")
+    three = one[one["formulation"] == "a"].assign(plant="a plant of one formulation")
     with style():
         found = draw_profiles(pd.concat([one, two, three]), Path())
         panels = [axis for axis in drawn["data_profiles"].axes if axis.get_visible()]
@@ -150,23 +151,25 @@ def test_plants_and_reference_modes_have_pictures_of_their_own(
 
 def test_of_many_laws_the_best_are_named(drawn: dict[str, matplotlib.figure.Figure]) -> None:
     """The others are grey, and the caption says how many."""
-    trials = _trials({f"law{i}": [1e-3 * (i + 1)] for i in range(12)})
+    trials = _trials({f"formulation{i}": [1e-3 * (i + 1)] for i in range(12)})
     with style():
         caption = draw_profiles(trials, Path())[0].caption
         labels = [line.get_label() for line in drawn["performance_profiles_1"].axes[0].get_lines()]
     named = [label for label in labels if not label.startswith("_")]
-    assert named == [f"law{i}" for i in range(NAMED)]
+    assert named == [f"formulation{i}" for i in range(NAMED)]
     assert len(labels) == 12
     assert f"the {12 - NAMED} after the eighth in grey" in caption
 
 
 @pytest.mark.parametrize(
-    "laws",
+    "contenders",
     [{}, {"a": [1e-3]}, {"a": [INF], "b": [INF]}, {"a": [1e-3], "oracle": [0.0]}, {"a": [None]}],
 )
-def test_nothing_to_compare_is_no_figure(laws: dict[str, list[float]], tmp_path: Path) -> None:
-    """No trials, one law, nothing but failures, nobody but the oracle."""
-    trials = _trials(laws) if laws else _trials({"a": [1e-3]}).iloc[:0]
+def test_nothing_to_compare_is_no_figure(
+    contenders: dict[str, list[float]], tmp_path: Path
+) -> None:
+    """No trials, one formulation, nothing but failures, nobody but the oracle."""
+    trials = _trials(contenders) if contenders else _trials({"a": [1e-3]}).iloc[:0]
     with style():
         assert draw_profiles(trials, tmp_path) == []
 

@@ -1,4 +1,4 @@
-"""Sweeps of a scenario's parameter and of a law's: found, and drawn as the table says."""
+"""Sweeps of a scenario's parameter and of a formulation's: found, and drawn as the table says."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 
 from dikbench.report.drawing.style import style
 from dikbench.report.drawing.value_scale import ValueScale
-from dikbench.report.figures.law_sweeps import draw_law_sweeps, law_sweeps
+from dikbench.report.figures.formulation_sweeps import draw_formulation_sweeps, formulation_sweeps
 from dikbench.report.figures.scenario_sweeps import draw_sweeps
 from dikbench.report.selection.sweeps import sweeps
 
@@ -42,7 +42,7 @@ def test_robots_are_curves_of_one_sweep(make_trials: MakeTrials) -> None:
 def test_curves_hold_what_the_table_says(
     make_trials: MakeTrials, drawn: list[Any], target: Path
 ) -> None:
-    """Each law has a panel, each of its points is the median of the trial over its seeds."""
+    """Each formulation has a panel, each of its points is the median over the seeds."""
     scenarios = [f"near-miss[miss={miss}]" for miss in MISSES]
     trials = make_trials(["dls", "pinv"], scenarios, seeds=(0, 1, 2))
     trials = trials.drop(columns="contour_error_rms_m", errors="ignore")
@@ -55,11 +55,13 @@ def test_curves_hold_what_the_table_says(
     panels = {axis.get_title(): axis for axis in drawn[0].axes}
     assert panels.keys() == {"dls", "pinv"}
     scale = ValueScale([float(miss) for miss in MISSES])
-    for law, axis in panels.items():
+    for formulation, axis in panels.items():
         curve = next(line for line in axis.lines if line.get_marker() == "o")
         places, heights = (values[~np.isnan(curve.get_xdata())] for values in curve.get_data())
-        of_law = trials[trials["formulation"] == law]
-        wanted = 1e3 * of_law.groupby("scenario", sort=False)["position_error_rms_m"].median()
+        of_formulation = trials[trials["formulation"] == formulation]
+        wanted = (
+            1e3 * of_formulation.groupby("scenario", sort=False)["position_error_rms_m"].median()
+        )
         np.testing.assert_allclose(places, scale.places)
         np.testing.assert_allclose(heights, wanted.clip(lower=1e-2))
 
@@ -93,21 +95,21 @@ def test_a_law_sweep_takes_the_median_error_and_the_worst_violation(
     make_trials: MakeTrials, drawn: list[Any], target: Path
 ) -> None:
     """Against the damping: per family the median error, the largest speed and violation."""
-    laws = [f"dls[damping={damping}]" for damping in ("0.01", "0.1", "1")]
+    formulations = [f"dls[damping={damping}]" for damping in ("0.01", "0.1", "1")]
     scenarios = ["reach", "reach[gain=2]", "reach[gain=4]", "step"]
-    trials = make_trials([*laws, "pinv", "qp[gain=1]"], scenarios)
+    trials = make_trials([*formulations, "pinv", "qp[gain=1]"], scenarios)
     trials = trials.drop(columns="contour_error_rms_m", errors="ignore")
-    (sweep,) = law_sweeps(trials)
-    assert (sweep.law, sweep.parameter) == ("dls", "damping")
+    (sweep,) = formulation_sweeps(trials)
+    assert (sweep.formulation, sweep.parameter) == ("dls", "damping")
     with style():
-        (figure,) = draw_law_sweeps(trials, target)
+        (figure,) = draw_formulation_sweeps(trials, target)
     assert figure.file == "law_dls_damping_1.svg"
     reach = trials[trials["scenario"].str.startswith("reach")]
-    by_law = reach.groupby("formulation", sort=False)
+    by_formulation = reach.groupby("formulation", sort=False)
     wanted = (
-        (1e3 * by_law["position_error_rms_m"].median())[laws].clip(lower=1e-2),
-        by_law["velocity_peak_ratio"].max()[laws],
-        100.0 * by_law["violating_share"].max()[laws],
+        (1e3 * by_formulation["position_error_rms_m"].median())[formulations].clip(lower=1e-2),
+        by_formulation["velocity_peak_ratio"].max()[formulations],
+        100.0 * by_formulation["violating_share"].max()[formulations],
     )
     for axis, values in zip(drawn[0].axes, wanted, strict=True):
         curve = next(line for line in axis.lines if line.get_label() == "reach")
@@ -117,8 +119,8 @@ def test_a_law_sweep_takes_the_median_error_and_the_worst_violation(
 
 @pytest.mark.parametrize("count", [1, 13, 60])
 def test_any_number_of_laws_is_drawn(make_trials: MakeTrials, target: Path, count: int) -> None:
-    """One law, a dozen and many are drawn, each page below 200 kB."""
-    names = [f"a-law-with-a-rather-long-name-{number}[gain=1]" for number in range(count)]
+    """One formulation, a dozen and many are drawn, each page below 200 kB."""
+    names = [f"a-formulation-with-a-rather-long-name-{number}[gain=1]" for number in range(count)]
     scenarios = [f"near-miss[miss={miss}]" for miss in ("0.1", "0.2", "0.3")]
     with style():
         figures = draw_sweeps(make_trials(names, scenarios), target)

@@ -30,7 +30,13 @@ pytestmark = pytest.mark.skipif(
     not (BROWSER and DRIVER), reason="no chromium with its driver is installed"
 )
 
-ERRORS = {"law 1": 9.0, "law 2": 0.1, "law 3": 1e-5, "law 4": 100.0, "law 5": 20.0}
+ERRORS = {
+    "formulation 1": 9.0,
+    "formulation 2": 0.1,
+    "formulation 3": 1e-5,
+    "formulation 4": 100.0,
+    "formulation 5": 20.0,
+}
 """Position errors [m] whose order as texts is another than as numbers."""
 
 OPTIONS = (
@@ -49,15 +55,19 @@ OPTIONS = (
 def report(
     tmp_path_factory: pytest.TempPathFactory, make_rows: MakeRows, write_results: WriteResults
 ) -> Path:
-    """A report on five laws, one of which failed, by its file."""
-    laws: dict[Any, Any] = {
-        name: {"position_error_rms_m": [error, error * 1.1], "law_time_median_us": error}
+    """A report on five formulations, one of which failed, by its file."""
+    formulations: dict[Any, Any] = {
+        name: {"position_error_rms_m": [error, error * 1.1], "formulation_time_median_us": error}
         for name, error in ERRORS.items()
     }
-    laws["law 4"] |= {"timing_verdict": "drift"}
-    laws["qp", "daqp"] = {"status": "timeout", "position_error_rms_m": 1.0, "claimed_share": 1.0}
+    formulations["formulation 4"] |= {"timing_stability": "drift"}
+    formulations["qp", "daqp"] = {
+        "status": "timeout",
+        "position_error_rms_m": 1.0,
+        "claimed_share": 1.0,
+    }
     folder = tmp_path_factory.mktemp("report") / "out"
-    write_results(folder, make_rows(laws, ("reach", "near-miss[miss=0.02]"), seeds=(0, 1)))
+    write_results(folder, make_rows(formulations, ("reach", "near-miss[miss=0.02]"), seeds=(0, 1)))
     write_report(folder)
     return folder / "report.html"
 
@@ -93,7 +103,7 @@ def table(page: Any) -> Any:
     return page.find_element(By.CSS_SELECTOR, "#tables table")
 
 
-def laws(page: Any) -> list[str]:
+def formulations(page: Any) -> list[str]:
     """The laws of the first table in their order on the page, those that are hidden left out."""
     rows = table(page).find_elements(By.CSS_SELECTOR, "tbody tr:not([hidden]) th")
     return [row.text for row in rows]
@@ -106,15 +116,15 @@ def heading(page: Any, words: str) -> Any:
 
 
 def sorted_by(page: Any, words: str, direction: str) -> list[str]:
-    """The order of the laws, once a column says that it is sorted so."""
+    """The order of the formulations, once a column says that it is sorted so."""
     wait = WebDriverWait(page, 10)
     wait.until(lambda page: heading(page, words).get_attribute("aria-sort") == direction)
     page.execute_async_script("setTimeout(arguments[0], 30)")  # sorting follows the click
-    return laws(page)
+    return formulations(page)
 
 
 def test_columns_are_sorted_by_number_both_ways(page: Any) -> None:
-    """1e-05 comes before 0.1, and 20 before 100; a failed law with no number comes last."""
+    """1e-05 comes before 0.1, and 20 before 100; a failed formulation with no number comes last."""
     button = heading(page, "position rms").find_element(By.TAG_NAME, "button")
     assert heading(page, "position rms").get_attribute("aria-sort") is None
     button.click()
@@ -126,21 +136,21 @@ def test_columns_are_sorted_by_number_both_ways(page: Any) -> None:
 
 def test_columns_are_sorted_by_keyboard(page: Any) -> None:
     """Tab reaches the buttons; Enter and Space press them, and the focus stays."""
-    button = heading(page, "law").find_element(By.TAG_NAME, "button")
+    button = heading(page, "formulation").find_element(By.TAG_NAME, "button")
     page.execute_script("arguments[0].focus()", button)
     page.switch_to.active_element.send_keys(Keys.TAB)
     assert page.switch_to.active_element.text.startswith("solver")
     page.switch_to.active_element.send_keys(Keys.SHIFT, Keys.TAB)
     page.switch_to.active_element.send_keys(Keys.ENTER)
-    assert sorted_by(page, "law", "ascending") == [*sorted(ERRORS), "qp"]
+    assert sorted_by(page, "formulation", "ascending") == [*sorted(ERRORS), "qp"]
     page.switch_to.active_element.send_keys(Keys.SPACE)
-    assert sorted_by(page, "law", "descending") == ["qp", *sorted(ERRORS, reverse=True)]
-    assert page.switch_to.active_element.text.startswith("law")
+    assert sorted_by(page, "formulation", "descending") == ["qp", *sorted(ERRORS, reverse=True)]
+    assert page.switch_to.active_element.text.startswith("formulation")
 
 
 def test_only_one_column_says_that_it_is_sorted(page: Any) -> None:
     """Sorting by another column takes the mark from the first."""
-    for words in ("law", "position rms"):
+    for words in ("formulation", "position rms"):
         heading(page, words).find_element(By.TAG_NAME, "button").click()
         sorted_by(page, words, "ascending")
     assert len(table(page).find_elements(By.CSS_SELECTOR, "th[aria-sort]")) == 1
@@ -150,13 +160,13 @@ def test_rows_are_filtered_by_law_and_solver(page: Any) -> None:
     """Every word must occur; the number of rows is said; no word shows all again."""
     box = page.find_element(By.ID, "filter")
     box.send_keys("daqp QP")
-    assert laws(page) == ["qp"]
+    assert formulations(page) == ["qp"]
     assert " of " in page.find_element(By.ID, "rows-shown").text
-    heading(page, "law").find_element(By.TAG_NAME, "button").click()
-    assert sorted_by(page, "law", "ascending") == ["qp"]
+    heading(page, "formulation").find_element(By.TAG_NAME, "button").click()
+    assert sorted_by(page, "formulation", "ascending") == ["qp"]
     box.clear()
     box.send_keys(Keys.SPACE)
-    assert len(laws(page)) == len(ERRORS) + 1
+    assert len(formulations(page)) == len(ERRORS) + 1
     assert page.find_element(By.ID, "rows-shown").text == ""
 
 
@@ -191,7 +201,7 @@ def test_all_of_it_is_there_without_scripts(browser: Any, report: Path) -> None:
     browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
     try:
         browser.get(report.as_uri())
-        assert laws(browser) == [*ERRORS, "qp"]
+        assert formulations(browser) == [*ERRORS, "qp"]
         assert browser.find_elements(By.CSS_SELECTOR, "th button") == []
         assert not browser.find_element(By.ID, "filter").is_displayed()
         assert browser.find_element(By.CSS_SELECTOR, ".findings dd").text

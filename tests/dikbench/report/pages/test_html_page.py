@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from dikbench.report.tables.table import Cell, Column
+from dikbench.report.tables.table import Column, TableCell
 from dikbench.report.write import write_report
 
 MakeRows = Callable[..., pd.DataFrame]
@@ -69,10 +69,14 @@ def report(
     """The folder of a report on two plants, with a failure, unstable times and a hostile law."""
     folder = tmp_path_factory.mktemp("report") / "out"
     scenarios = ("reach", "near-miss[miss=0.02]", f"near-miss[robot={HOSTILE.replace('`', '')}]")
-    times = {"law_time_median_us": 10.0, "law_time_p99_us": 12.0, "timing_verdict": "stable"}
-    laws = {
+    times = {
+        "formulation_time_median_us": 10.0,
+        "formulation_time_p99_us": 12.0,
+        "timing_stability": "stable",
+    }
+    formulations = {
         "pinv": {"position_error_rms_m": [0.003, 0.02, 0.1], **times},
-        "dls[damping=0.1]": {"position_error_rms_m": 0.02, **times, "timing_verdict": "drift"},
+        "dls[damping=0.1]": {"position_error_rms_m": 0.02, **times, "timing_stability": "drift"},
         ("qp", "daqp"): {
             "position_error_rms_m": 1e-5,
             "claimed_share": 1.0,
@@ -84,7 +88,9 @@ def report(
             "message": f"RuntimeError: {HOSTILE}",
         },
     }
-    rows = [make_rows(laws, scenarios, seeds=(0, 1), plant=p) for p in ("ideal", "saturating")]
+    rows = [
+        make_rows(formulations, scenarios, seeds=(0, 1), plant=p) for p in ("ideal", "saturating")
+    ]
     write_results(
         folder,
         pd.concat(rows, ignore_index=True),
@@ -158,17 +164,17 @@ def test_every_figure_is_within_and_described(report: Path) -> None:
 
 
 def test_the_best_is_marked_and_unstable_times_are_greyed(report: Path) -> None:
-    """The star stands at the law with the smallest error, the tilde at times that drift."""
+    """The star stands at the formulation with the smallest error, the tilde at times that drift."""
     text = (report / "report.html").read_text(encoding="utf-8")
     rows = re.findall(r'<tr><th scope="row" class="name">(.*?)</th>(.*?)</tr>', text)
     assert any(name == "qp" and "class=best" in cells.replace('"', "") for name, cells in rows)
     unstable = {name for name, cells in rows if "unstable" in cells}
     assert unstable == {"dls[damping=0.1]"}
-    assert 'class="bad"' in text  # the law that failed
+    assert 'class="bad"' in text  # the formulation that failed
 
 
 def test_families_and_laws_are_described(report: Path) -> None:
-    """What a family provokes and its certificate, a law's program, source and attributes."""
+    """What a family provokes, its certificate, a formulation's program, source and attributes."""
     shown = Page.of(report / "report.html").shown()
     assert "joint speeds beyond the limits near a singularity" in shown
     assert "smallest singular value on the path (m, rad) = 0.01347" in shown
@@ -192,7 +198,7 @@ def test_the_markdown_says_the_same(report: Path) -> None:
     outside = re.sub(r"`[^`\n]*`", "", text)
     assert "<script>" not in outside
     assert "<img" not in outside
-    for heading in ("Which law for which situation", "Limitations", "How it was made"):
+    for heading in ("Which formulation for which situation", "Limitations", "How it was made"):
         assert f"## {heading}" in text
     assert "Most accurate" in text
     for figure in (report / "figures").glob("*.svg"):
@@ -225,7 +231,7 @@ def test_cells_are_sorted_by_their_number() -> None:
     from dikbench.report.pages.html_page import _td
 
     column = Column("a", "a", "a")
-    assert _td(Cell(float("nan")), column) == "<td></td>"
-    assert _td(Cell(0.12345), column) == "<td>0.123</td>"
-    assert 'data-sort="2"' in _td(Cell(2.0, 1.0, 3.0), column)
-    assert 'data-sort="Infinity"' in _td(Cell(float("inf")), column)
+    assert _td(TableCell(float("nan")), column) == "<td></td>"
+    assert _td(TableCell(0.12345), column) == "<td>0.123</td>"
+    assert 'data-sort="2"' in _td(TableCell(2.0, 1.0, 3.0), column)
+    assert 'data-sort="Infinity"' in _td(TableCell(float("inf")), column)

@@ -7,7 +7,6 @@ import pandas as pd
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dikbench.report.sentences.comparison import ROUNDING, SAME, lead
 from dikbench.report.sentences.findings import (
     fail_most,
     fastest,
@@ -17,6 +16,7 @@ from dikbench.report.sentences.findings import (
     most_accurate_within_limits,
     stay_on_course,
 )
+from dikbench.report.sentences.paired_wins import ROUNDING, SAME, lead
 from dikbench.report.sentences.words import Names, number
 
 MakeRows = Callable[..., pd.DataFrame]
@@ -44,15 +44,17 @@ def test_laws_that_are_the_same_are_not_ranked(make_rows: MakeRows) -> None:
     """Values that differ by less than 1 % are a tie, whoever comes first."""
     values = {"position_error_rms_m": 0.001}
     alike = {"position_error_rms_m": 0.001 * (1 + SAME / 2)}
-    for laws in ({"a": values, "b": alike}, {"b": alike, "a": values}):
-        rows = make_rows(laws, THREE)
+    for contenders in ({"a": values, "b": alike}, {"b": alike, "a": values}):
+        rows = make_rows(contenders, THREE)
         found = most_accurate(rows, Names(rows)).text
-        assert found.startswith(" and ".join(f"`{name}`" for name in laws) + ", not told apart,")
+        assert found.startswith(
+            " and ".join(f"`{name}`" for name in contenders) + ", not told apart,"
+        )
         assert "next is" not in found
 
 
 def test_a_better_median_that_wins_too_few_trials_is_a_tie(make_rows: MakeRows) -> None:
-    """One scenario that moves the median does not make a law the best."""
+    """One scenario that moves the median does not make a formulation the best."""
     rows = make_rows(
         {
             "a": {"position_error_rms_m": [0.001, 0.002, 0.009]},
@@ -75,22 +77,28 @@ def test_a_lead_is_what_it_says(values: list[list[float]]) -> None:
     """Its value is the smallest median, and the runner-up loses twice as often as it wins."""
     rows = pd.DataFrame(
         [
-            {"formulation": f"law{i}", "solver": "none", "scenario": s, "seed": 0, "error": value}
-            for i, law in enumerate(values)
-            for s, value in zip(THREE, law, strict=True)
+            {
+                "formulation": f"formulation{i}",
+                "solver": "none",
+                "scenario": s,
+                "seed": 0,
+                "error": value,
+            }
+            for i, contender in enumerate(values)
+            for s, value in zip(THREE, contender, strict=True)
         ]
     )
-    laws = [(f"law{i}", "none") for i in range(len(values))]
-    found = lead(rows, "error", laws)
+    contenders = [(f"formulation{i}", "none") for i in range(len(values))]
+    found = lead(rows, "error", contenders)
     assert found is not None
-    medians = {law: sorted(of)[1] for law, of in zip(laws, values, strict=True)}
+    medians = {contender: sorted(of)[1] for contender, of in zip(contenders, values, strict=True)}
     assert found.value == min(medians.values())
-    assert min(medians, key=medians.__getitem__) in found.laws
+    assert min(medians, key=medians.__getitem__) in found.contenders
     if found.runner_up is not None:
-        assert found.runner_up not in found.laws
+        assert found.runner_up not in found.contenders
         assert found.runner_up_value > found.value * (1 + SAME)
-        index = laws.index(found.runner_up)
-        leader = values[laws.index(min(medians, key=medians.__getitem__))]
+        index = contenders.index(found.runner_up)
+        leader = values[contenders.index(min(medians, key=medians.__getitem__))]
         clearly = [
             (b - a > SAME * a + ROUNDING, a - b > SAME * b + ROUNDING)
             for a, b in zip(leader, values[index], strict=True)
@@ -116,15 +124,18 @@ def test_a_law_that_failed_or_whose_answers_are_wrong_leads_in_nothing(
     assert most_accurate(rows, names).text.startswith("`fair` with 10 mm")
     assert keepers(rows) == [("fair", "none")]
     missing = rows[~((rows["formulation"] == "fair") & (rows["scenario"] == "reach"))]
-    assert most_accurate(missing, names).text.startswith("No law in this run")
+    assert most_accurate(missing, names).text.startswith("No formulation in this run")
 
 
 def test_without_a_keeper_no_law_is_named(make_rows: MakeRows) -> None:
     """Where every law passes a limit the sentences say that none qualifies, and by how much."""
     rows = make_rows({"a": TOO_FAST, "b": TOO_FAST}, THREE)
     names = Names(rows)
-    assert keep_limits(rows, names).text == "No law in this run keeps every limit in all 3 trials."
-    assert most_accurate_within_limits(rows, names).text.startswith("No law in this run")
+    assert (
+        keep_limits(rows, names).text
+        == "No formulation in this run keeps every limit in all 3 trials."
+    )
+    assert most_accurate_within_limits(rows, names).text.startswith("No formulation in this run")
     assert "joint speeds reach 3 times their limit" in most_accurate(rows, names).text
 
 
@@ -159,7 +170,9 @@ def test_who_stays_on_course_and_who_of_them_gets_on(make_rows: MakeRows) -> Non
     assert "`exact`, `slow` and `less slow`: never more than 1 deg off" in text
     assert "Within the limits `less slow` gets on best, at 80 %" in text
     astray = rows[rows["formulation"] == "astray"]
-    assert "No law in this run stays within 1 deg" in stay_on_course(astray, Names(rows)).text
+    assert (
+        "No formulation in this run stays within 1 deg" in stay_on_course(astray, Names(rows)).text
+    )
 
 
 def test_who_fails_most(make_rows: MakeRows) -> None:
@@ -182,10 +195,13 @@ def test_who_fails_most(make_rows: MakeRows) -> None:
 
 
 def test_times_that_a_stable_cell_may_drift_apart_are_a_tie(make_rows: MakeRows) -> None:
-    """Laws within 25 % share the first place; unstable cells are counted beside it."""
+    """Formulations within 25 % share the first place; unstable cells are counted beside it."""
     times = {"a": 10.0, "b": 12.0, "c": 100.0}
     rows = make_rows(
-        {name: {"law_time_median_us": t, "timing_verdict": "stable"} for name, t in times.items()},
+        {
+            name: {"formulation_time_median_us": t, "timing_stability": "stable"}
+            for name, t in times.items()
+        },
         THREE,
     )
     names = Names(rows)
@@ -194,7 +210,7 @@ def test_times_that_a_stable_cell_may_drift_apart_are_a_tie(make_rows: MakeRows)
     assert "of those that keep every limit `c` takes 100 us a call" in text
     assert "the slowest, `c`, takes 10 times as long" in text
     assert "not stable" not in text
-    rows.loc[0, "timing_verdict"] = "drift: a lot"
+    rows.loc[0, "timing_stability"] = "drift: a lot"
     assert "Of 9 timed cells 1 are not stable" in fastest(rows, [], names).text
     assert fastest(make_rows({"a": {}}), [], names).text == "No times were taken."
 

@@ -32,10 +32,10 @@ def test_each_limitation_is_said_where_it_applies_and_only_there(make_rows: Make
         "Feasible programs without an answer": {"solver_failed_share": 0.2},
         "Acceleration bounds that were given up": {"relaxed_share": 0.2},
         "1 are not stable": {
-            "law_time_median_us": 1.0, "timing_verdict": ["drift: a round", "stable"],
+            "formulation_time_median_us": 1.0, "timing_stability": ["drift: a round", "stable"],
         },
         "`a` on `reach`: drift: a round.": {
-            "law_time_median_us": 1.0, "timing_verdict": ["drift: a round", "stable"],
+            "formulation_time_median_us": 1.0, "timing_stability": ["drift: a round", "stable"],
         },
     }  # fmt: skip
     scenarios = ("reach", "near-miss")
@@ -53,7 +53,7 @@ def test_one_seed_no_times_and_one_way_of_running_are_said(make_rows: MakeRows) 
         "The plant `saturating`.", "The reference `path`.", "The oracle, a measure", "A note.",
     ):  # fmt: skip
         assert sentence in told(one)
-    timed = {"law_time_median_us": 1.0, "timing_verdict": "stable"}
+    timed = {"formulation_time_median_us": 1.0, "timing_stability": "stable"}
     more = [
         make_rows({"pinv": timed, "oracle": {}}, seeds=(0, 1), plant=plant, reference=reference)
         for plant in ("ideal", "saturating")
@@ -66,9 +66,9 @@ def test_one_seed_no_times_and_one_way_of_running_are_said(make_rows: MakeRows) 
 
 
 def test_what_was_not_run_is_what_is_registered_without_what_was(make_rows: MakeRows) -> None:
-    """A law that ran is not listed among those of which nothing is said."""
+    """A formulation that ran is not listed among those of which nothing is said."""
     text = told(make_rows({"pinv[after=clip]": {}}))
-    line = next(line for line in text.split("\n") if " laws: " in line)
+    line = next(line for line in text.split("\n") if " formulations: " in line)
     assert "`dls`" in line
     assert "`pinv`" not in line
 

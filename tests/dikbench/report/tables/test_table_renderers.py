@@ -21,7 +21,7 @@ from dikbench.report.tables.csv_table import to_csv
 from dikbench.report.tables.files import write_table
 from dikbench.report.tables.latex_table import to_latex, to_latex_per_family
 from dikbench.report.tables.markdown import markdown_blocks, markdown_rows, to_markdown
-from dikbench.report.tables.table import Block, Cell, Column, Row, Table, shown
+from dikbench.report.tables.table import Block, Column, Table, TableCell, TableRow, shown
 
 HOSTILE = (
     "<script>alert('x')</script>",
@@ -44,24 +44,24 @@ COLUMNS = (
 )
 
 
-def _row(name: str, solver: str, *cells: Cell) -> Row:
-    return Row(name, solver, (Cell(0.0), Cell(0.0), Cell(8.0), *cells))
+def _row(name: str, solver: str, *cells: TableCell) -> TableRow:
+    return TableRow(name, solver, (TableCell(0.0), TableCell(0.0), TableCell(8.0), *cells))
 
 
-def _table(rows: list[Row], family: str = "reach") -> Table:
+def _table(rows: list[TableRow], family: str = "reach") -> Table:
     blocks = [Block(name, "ideal", "time", tuple(rows)) for name in ("all", family)]
     return Table("made_up", "Made up", COLUMNS, tuple(blocks), ("error [m]: it is 1 % off",))
 
 
 PLAIN = _table(
     [
-        _row("pinv", "none", Cell(0.01234, 0.0101, 0.0155, best=True), Cell(math.inf)),
-        _row("qp", "daqp", Cell(0.5, 0.5, 0.5), Cell(12345.6, unstable=True)),
-        _row("lost", "none", Cell(math.nan), Cell(-2.5e-7, best=True, unstable=True)),
+        _row("pinv", "none", TableCell(0.01234, 0.0101, 0.0155, best=True), TableCell(math.inf)),
+        _row("qp", "daqp", TableCell(0.5, 0.5, 0.5), TableCell(12345.6, unstable=True)),
+        _row("lost", "none", TableCell(math.nan), TableCell(-2.5e-7, best=True, unstable=True)),
     ]
 )
 HARMFUL = _table(
-    [_row(name, name, Cell(1.0), Cell(2.0)) for name in HOSTILE], family="<b>|100%\n# _"
+    [_row(name, name, TableCell(1.0), TableCell(2.0)) for name in HOSTILE], family="<b>|100%\n# _"
 )
 
 
@@ -135,14 +135,18 @@ def test_the_console_fits_a_screen() -> None:
     """No line is wider, no block longer, and what was left out is said."""
     wide = tuple(Column(f"c{i}", f"heading number {i} [rad/s]", "number", "low") for i in range(30))
     rows = [
-        Row(f"law{i:02}[parameter={'x' * 90}]", "daqp", tuple(Cell(float(i)) for _ in range(33)))
+        TableRow(
+            f"formulation{i:02}[parameter={'x' * 90}]",
+            "daqp",
+            tuple(TableCell(float(i)) for _ in range(33)),
+        )
         for i in range(40)
     ]
     blocks = [Block("all", plant, "time", tuple(rows[::-1])) for plant in "abc"]
     table = Table("made_up", "Made up", (*COLUMNS[:3], *wide), tuple(blocks), ())
     text = to_text(table)
     assert max(map(len, text.splitlines())) <= WIDTH
-    assert text.count("law") < 2 * (ROWS + 2) + 4
+    assert text.count("contender") < 2 * (ROWS + 2) + 4
     assert text.count("and 28 more: tables/made_up.md") == 2
     assert "(1): tables/made_up.md" in text
     assert text.index("law00") < text.index("law01")  # the best first
@@ -150,7 +154,7 @@ def test_the_console_fits_a_screen() -> None:
 
 
 def test_the_console_says_failures_out_of_trials_and_stars_the_best() -> None:
-    """A line per law."""
+    """A line per formulation."""
     lines = to_text(PLAIN).splitlines()
     assert lines[0] == "Made up"
     assert re.fullmatch(r"pinv +0/8 +0\.0123\* +inf", lines[4])

@@ -17,7 +17,7 @@ from dikbench.report.tables.build import make_table
 from dikbench.report.tables.csv_table import to_csv
 from dikbench.report.tables.files import write_table
 from dikbench.report.tables.kinds import KINDS, LIMIT_VIOLATION, TIMING, TRACKING_ERROR
-from dikbench.report.tables.table import Block, Cell, Table
+from dikbench.report.tables.table import Block, Table, TableCell
 
 Rows = list[dict[str, str]]
 
@@ -85,10 +85,10 @@ def _expected(key: str, rows: Rows, shift: float, times: bool) -> float:
     if times:
         rows = list({row["scenario"]: row for row in reversed(rows)}.values())
     if key == "timed":
-        return sum(row["law_time_median_us"] != "" for row in rows)
+        return sum(row["formulation_time_median_us"] != "" for row in rows)
     if key == "unstable":
-        timed = [row for row in rows if row["law_time_median_us"]]
-        return sum(row["timing_verdict"] != "stable" for row in timed)
+        timed = [row for row in rows if row["formulation_time_median_us"]]
+        return sum(row["timing_stability"] != "stable" for row in timed)
     column = key.removesuffix("_worst")
     values = _defined([_value(row, column, times) for row in rows])
     if key.endswith("_worst"):
@@ -155,12 +155,18 @@ def _naive_interval(values: dict[str, dict[str, list[float]]], mean: object) -> 
 def _synthetic(path: Path) -> Path:
     """Trials of five laws with failures, skips, undefined metrics and zeros, as a CSV file."""
     numbers = np.random.default_rng(11)
-    laws = [("pinv", "none"), ("qp", "daqp"), ("qp", "osqp"), ("lost", "none"), ("oracle", "none")]
+    contenders = [
+        ("pinv", "none"),
+        ("qp", "daqp"),
+        ("qp", "osqp"),
+        ("lost", "none"),
+        ("oracle", "none"),
+    ]
     scenarios = [f"{f}[miss={m}]" for f in ("near-miss", "reach", "step") for m in (1, 2, 3)]
     rows = []
-    for law, (formulation, solver) in enumerate(laws):
+    for contender, (formulation, solver) in enumerate(contenders):
         for scenario in scenarios:
-            time = 10.0 * (law + 1) * numbers.lognormal(0.0, 0.2)
+            time = 10.0 * (contender + 1) * numbers.lognormal(0.0, 0.2)
             timed = formulation not in ("lost", "oracle")
             verdict = "drift: 40 %" if solver == "osqp" and scenario < "reach" else "stable"
             for plant in ("ideal", "saturating"):
@@ -170,7 +176,7 @@ def _synthetic(path: Path) -> Path:
                         status = "crashed"
                     elif formulation == "qp" and scenario.startswith("step") and seed:
                         status = "diverged" if solver == "osqp" else "skipped"
-                    error = (law + 1) * 1e-3 * numbers.lognormal(0.0, 1.0)
+                    error = (contender + 1) * 1e-3 * numbers.lognormal(0.0, 1.0)
                     no_path = scenario.startswith("step")
                     rows.append(
                         {
@@ -184,23 +190,23 @@ def _synthetic(path: Path) -> Path:
                             "steps": 100,
                             "contour_error_rms_m": np.nan if no_path else error / 2,
                             "contour_error_max_m": np.nan if no_path else error,
-                            "lag_max_s": np.nan if no_path else 0.1 * law,
+                            "lag_max_s": np.nan if no_path else 0.1 * contender,
                             "position_error_rms_m": error,
                             "position_error_max_m": 2 * error,
-                            "orientation_error_rms_rad": 0.0 if law == 0 else error,
+                            "orientation_error_rms_rad": 0.0 if contender == 0 else error,
                             "off_course_max_rad": min(100 * error, 3.0),
                             "progress_mean": 1 - 10 * error,
                             "progress_min": 1 - 90 * error,
                             "stuck_share": 0.0 if seed else error,
                             "velocity_peak_ratio": 0.5 + error,
-                            "violating_share": error if law else 0.0,
+                            "violating_share": error if contender else 0.0,
                             "position_violation_max_rad": error if seed else 0.0,
-                            "law_time_median_us": time if timed else np.nan,
-                            "law_own_time_median_us": time if timed else np.nan,
+                            "formulation_time_median_us": time if timed else np.nan,
+                            "formulation_own_time_median_us": time if timed else np.nan,
                             "solver_core_time_median_us": time / 3 if solver != "none" else 0.0,
-                            "law_time_p99_us": 2 * time if timed else np.nan,
-                            "law_time_max_us": 3 * time if timed else np.nan,
-                            "timing_verdict": verdict if timed else None,
+                            "formulation_time_p99_us": 2 * time if timed else np.nan,
+                            "formulation_time_max_us": 3 * time if timed else np.nan,
+                            "timing_stability": verdict if timed else None,
                         }
                     )
     pd.DataFrame(rows).to_csv(path, index=False)
@@ -275,23 +281,23 @@ def _block(table: Table, family: str = "all", plant: str | None = "ideal") -> Bl
     return next(b for b in table.blocks if b.family == family and b.plant == plant)
 
 
-def _column(table: Table, block: Block, key: str) -> dict[str, Cell]:
-    """The cells of a column by law and solver."""
+def _column(table: Table, block: Block, key: str) -> dict[str, TableCell]:
+    """The cells of a column by formulation and solver."""
     place = [column.key for column in table.columns].index(key)
     return {f"{row.formulation} {row.solver}": row.cells[place] for row in block.rows}
 
 
 def _best(table: Table, key: str, family: str = "all", plant: str | None = "ideal") -> set[str]:
     cells = _column(table, _block(table, family, plant), key)
-    return {law for law, cell in cells.items() if cell.best}
+    return {contender for contender, cell in cells.items() if cell.best}
 
 
 def _trials(**columns: list[object]) -> pd.DataFrame:
-    """Trials of one scenario, a law each, with what a table needs at least."""
+    """Trials of one scenario, a formulation each, with what a table needs at least."""
     frame = pd.DataFrame(columns)
     given = {
         "solver": "none", "scenario": "reach", "plant": "ideal", "reference": "time", "seed": 0,
-        "status": "ok", "law_time_median_us": np.nan, "timing_verdict": None,
+        "status": "ok", "formulation_time_median_us": np.nan, "timing_stability": None,
     }  # fmt: skip
     for name, value in given.items():
         if name not in frame:
@@ -395,7 +401,7 @@ def test_times_that_cannot_be_trusted_are_marked(synthetic: Path) -> None:
     """A law of which half of the timed cells are unstable, there, and no other; nor its counts."""
     table = make_table(TIMING, pd.read_csv(synthetic / "trials.csv"))
     for family, unstable in (("all", False), ("near-miss", True), ("step", False)):
-        cells = _column(table, _block(table, family, None), "law_time_median_us")
+        cells = _column(table, _block(table, family, None), "formulation_time_median_us")
         assert cells["qp osqp"].unstable is unstable
         assert not cells["qp daqp"].unstable
         assert not cells["lost none"].unstable
@@ -408,7 +414,7 @@ def test_a_law_that_crashed_everywhere_stands_in_the_timing_table(synthetic: Pat
     table = make_table(TIMING, pd.read_csv(synthetic / "trials.csv"))
     block = _block(table, plant=None)
     assert _column(table, block, "failure_rate")["lost none"].value == 1.0
-    assert math.isnan(_column(table, block, "law_time_median_us")["lost none"].value)
+    assert math.isnan(_column(table, block, "formulation_time_median_us")["lost none"].value)
 
 
 def test_columns_that_older_results_lack_are_left_out() -> None:

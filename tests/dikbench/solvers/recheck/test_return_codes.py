@@ -100,7 +100,7 @@ def test_claims_and_verdicts_of_a_run_reach_the_trace() -> None:
 def test_a_row_says_how_often_the_return_code_was_right() -> None:
     """OSQP at its own settings claims everything; a third of it is wrong by our residuals."""
     rows = [
-        run_trial(Trial("qp", "near-miss[miss=0.02]", solver, "ideal", "time", 0))
+        run_trial(Trial.of("qp", "near-miss[miss=0.02]", solver, "ideal", "time", 0))
         for solver in ("osqp", "daqp", "osqp[preset=high]")
     ]
     loose, exact, tight = rows
@@ -109,7 +109,7 @@ def test_a_row_says_how_often_the_return_code_was_right() -> None:
     assert loose["disagreed_share"] == pytest.approx(1 - loose["verified_share"])
     assert exact["disagreed_share"] == 0.0
     assert tight["disagreed_share"] == 0.0
-    without = run_trial(Trial("dls", "reach", "none", "ideal", "time", 0))
+    without = run_trial(Trial.of("dls", "reach", "none", "ideal", "time", 0))
     assert np.isnan(without["claimed_share"])
 
 

@@ -1,4 +1,4 @@
-"""What the keys in a law's `Source:` paragraph stand for."""
+"""What the keys in a formulation's `Source:` paragraph stand for."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 PAGE: Final = "REFERENCES.md"
-"""The page of references, which stands beside the laws that cite it."""
+"""The page of references, which stands beside the formulations that cite it."""
 
 _ENTRY: Final = re.compile(r"^- \*\*\[(?P<key>[^\]]+)\]\*\* (?P<text>.+)$", re.MULTILINE)
 
@@ -17,7 +17,7 @@ def references(file: Path | None, source: str) -> tuple[str, ...]:
     """The works that a source cites by key, in its order; those without an entry are left out.
 
     Args:
-        file: where the law is written.
+        file: where the formulation is written.
         source: its `Source:` paragraph, with keys in brackets.
     """
     if file is None:

@@ -1,4 +1,4 @@
-"""Which laws lead in a metric, and which of them the trials do not tell apart."""
+"""Which formulations lead in a metric, and which of them the trials do not tell apart."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ from typing import Final
 import numpy as np
 import pandas as pd
 
-from dikbench.report.sentences.words import Law
-from dikbench.statistics.problems import LAW
+from dikbench.report.sentences.words import Contender
+from dikbench.statistics.trial_matrix import CONTENDER
 
 SAME: Final = 0.01
 """Values closer together than this share of the smaller one are the same."""
 
 MOST: Final = 2 / 3
-"""A law is better than another where it wins this share of the trials that one of them wins."""
+"""A formulation is better than another where it wins this share of the trials that one of them
+wins."""
 
 ROUNDING: Final = 1e-9
 """Differences smaller than this are rounding."""
@@ -27,37 +28,38 @@ class Lead:
     """The law with the smallest median of a metric, and those that cannot be told apart from it.
 
     Attributes:
-        laws: all of them, in the order in which they ran.
+        formulations: all of them, in the order in which they ran.
         value: the smallest median.
-        runner_up: the next law that can be told apart; None where there is none.
+        runner_up: the next formulation that can be told apart; None where there is none.
         runner_up_value: its median.
         wins: in how many of the trials that both ran the leader was better than it.
-        trials: how many trials each law ran.
+        trials: how many trials each formulation ran.
     """
 
-    laws: tuple[Law, ...]
+    contenders: tuple[Contender, ...]
     value: float
-    runner_up: Law | None
+    runner_up: Contender | None
     runner_up_value: float
     wins: int
     trials: int
 
 
-def lead(rows: pd.DataFrame, metric: str, laws: Sequence[Law]) -> Lead | None:
+def lead(rows: pd.DataFrame, metric: str, contenders: Sequence[Contender]) -> Lead | None:
     """Who leads in a metric of which the smallest value is the best.
 
-    Another law is told apart from the leader only where its median is larger by more than 1 %, and
-    where the leader wins at least two thirds of the trials in which they differ by more than that.
+    Another one is distinguished from the leader only where its median is larger by more than 1 %,
+    and where the leader wins at least two thirds of the trials in which they differ by more than
+    that.
 
     Args:
         rows: trials of one plant and one reference mode.
         metric: its column.
-        laws: those that are compared; all ran all trials.
+        contenders: those that are compared; all ran all trials.
 
     Returns:
         None where the metric is defined for none of them.
     """
-    table = _table(rows, metric, laws)
+    table = _table(rows, metric, contenders)
     if table.empty:
         return None
     values, medians = table.to_numpy(), table.median().to_numpy()
@@ -67,7 +69,7 @@ def lead(rows: pd.DataFrame, metric: str, laws: Sequence[Law]) -> Lead | None:
     losses = (leader - values > SAME * np.abs(values) + ROUNDING).sum(axis=0)
     value = float(medians[best])
     apart = (medians - value > SAME * abs(value) + ROUNDING) & (wins >= MOST * (wins + losses))
-    names = [law for law in laws if law in table.columns]
+    names = [contender for contender in contenders if contender in table.columns]
     together = tuple(name for name, told in zip(names, apart, strict=True) if not told)
     if not apart.any():
         return Lead(together, value, None, float("nan"), 0, len(table))
@@ -83,11 +85,11 @@ def lead(rows: pd.DataFrame, metric: str, laws: Sequence[Law]) -> Lead | None:
     )
 
 
-def _table(rows: pd.DataFrame, metric: str, laws: Sequence[Law]) -> pd.DataFrame:
+def _table(rows: pd.DataFrame, metric: str, contenders: Sequence[Contender]) -> pd.DataFrame:
     """A metric with a row per scenario and seed and a column per law for which it is defined."""
-    if not laws:
+    if not contenders:
         return pd.DataFrame()
-    values = rows.set_index(["scenario", "seed", *LAW])[metric]
-    table = values[~values.index.duplicated()].unstack(LAW)
-    table = table.reindex(columns=pd.MultiIndex.from_tuples(laws))
+    values = rows.set_index(["scenario", "seed", *CONTENDER])[metric]
+    table = values[~values.index.duplicated()].unstack(CONTENDER)
+    table = table.reindex(columns=pd.MultiIndex.from_tuples(contenders))
     return table.dropna(how="all").dropna(axis="columns")

@@ -1,4 +1,4 @@
-"""Error, peak speed and violation against a parameter of a law, per family of scenarios."""
+"""Error, peak speed and violation against a parameter of a formulation, per family of scenarios."""
 
 from __future__ import annotations
 
@@ -13,83 +13,87 @@ import pandas as pd
 from dikbench.report.drawing.figure import Figure
 from dikbench.report.drawing.style import WIDTH, file_name, logarithmic, look, marker, save, short
 from dikbench.report.drawing.value_scale import ValueScale
-from dikbench.report.selection.rows import LEAST_ERROR, error_column, how, one_way, with_failures
+from dikbench.report.selection.rows import (
+    LEAST_ERROR,
+    error_column,
+    failures_at_infinity,
+    how,
+    one_way,
+)
 from dikbench.report.selection.stored_motions import in_panels
 from dikbench.report.selection.sweeps import FEWEST, number
-from dikbench.report.tables.build import family
-from dikbench.selector import parse_selector
+from dikbench.results.selected import parameters_of
+from dikbench.selector import listed
 
 
 @dataclass(frozen=True, eq=False)
-class LawSweep:
-    """Trials of one law of which one numeric parameter takes several values.
+class FormulationSweep:
+    """Trials of one formulation of which one numeric parameter takes several values.
 
     Attributes:
-        law: its name.
+        formulation: its name.
         parameter: what is swept.
         others: its other parameters, as in a selector.
-        rows: its trials, with columns `value` and `family`.
+        rows: its trials, with a column `value`.
     """
 
-    law: str
+    formulation: str
     parameter: str
     others: str
     rows: pd.DataFrame
 
 
-def law_sweeps(ran: pd.DataFrame) -> list[LawSweep]:
-    """Find the laws of which one numeric parameter takes at least three values."""
+def formulation_sweeps(ran: pd.DataFrame) -> list[FormulationSweep]:
+    """Find the formulations of which one numeric parameter takes at least three values."""
     chosen = one_way(ran)
+    names = dict(zip(chosen["formulation"], chosen["formulation_name"], strict=True))
     groups: dict[tuple[str, str, str], dict[str, float]] = {}
-    for formulation in dict.fromkeys(chosen["formulation"]):
-        selector = parse_selector(formulation)
-        for parameter, text in selector.parameters.items():
-            value = number(text)
+    for formulation, parameters in parameters_of(chosen, "formulation").items():
+        for parameter, given in parameters.items():
+            value = number(given)
             if value is not None:
-                rest = (f"{k}={v}" for k, v in selector.parameters.items() if k != parameter)
-                key = (selector.name, parameter, ",".join(rest))
+                rest = {k: v for k, v in parameters.items() if k != parameter}
+                key = (names[formulation], parameter, listed(rest))
                 groups.setdefault(key, {})[formulation] = value
     found = []
-    for (law, parameter, others), values in groups.items():
+    for (formulation, parameter, others), values in groups.items():
         if len(set(values.values())) >= FEWEST:
             rows = chosen[chosen["formulation"].isin(values)]
-            rows = rows.assign(
-                value=rows["formulation"].map(values), family=rows["scenario"].map(family)
-            )
-            found.append(LawSweep(law, parameter, others, rows))
+            rows = rows.assign(value=rows["formulation"].map(values))
+            found.append(FormulationSweep(formulation, parameter, others, rows))
     return found
 
 
-def draw_law_sweeps(ran: pd.DataFrame, target: Path) -> list[Figure]:
-    """Draw every sweep of a numeric parameter of a law."""
+def draw_formulation_sweeps(ran: pd.DataFrame, target: Path) -> list[Figure]:
+    """Draw every sweep of a numeric parameter of a formulation."""
     figures = []
-    for place, sweep in enumerate(law_sweeps(ran), start=1):
+    for place, sweep in enumerate(formulation_sweeps(ran), start=1):
         if not np.isfinite(per_family(sweep)["error"]).any():
             continue
         _, name = error_column(sweep.rows)
-        file = file_name("law", sweep.law, sweep.parameter, place)
+        file = file_name("formulation", sweep.formulation, sweep.parameter, place)
         caption = (
-            f"{sweep.law}{f' ({sweep.others})' if sweep.others else ''} against its "
+            f"{sweep.formulation}{f' ({sweep.others})' if sweep.others else ''} against its "
             f"{sweep.parameter}, {how(sweep.rows)}: the median rms {name}, the largest peak "
             "speed and the largest share of steps that pass a limit, over the scenarios of each "
             "family; a failed trial counts as infinite, and infinity leaves a gap."
         )
-        title = f"{sweep.law} against its {sweep.parameter}"
+        title = f"{sweep.formulation} against its {sweep.parameter}"
         figures.append(Figure(_draw(sweep, target, file), caption, title))
     return figures
 
 
-def per_family(sweep: LawSweep) -> pd.DataFrame:
+def per_family(sweep: FormulationSweep) -> pd.DataFrame:
     """Per family and value the median `error` [mm], the worst `peak` speed and `violating` [%]."""
     column, _ = error_column(sweep.rows)
     rows = sweep.rows
     table = pd.DataFrame(
         {
-            "family": rows["family"],
+            "family": rows["scenario_family"],
             "value": rows["value"],
-            "error": 1e3 * with_failures(rows, column),
-            "peak": with_failures(rows, "velocity_peak_ratio"),
-            "violating": 100.0 * with_failures(rows, "violating_share"),
+            "error": 1e3 * failures_at_infinity(rows, column),
+            "peak": failures_at_infinity(rows, "velocity_peak_ratio"),
+            "violating": 100.0 * failures_at_infinity(rows, "violating_share"),
         }
     )
     groups = table.groupby(["family", "value"], sort=False)
@@ -97,7 +101,7 @@ def per_family(sweep: LawSweep) -> pd.DataFrame:
     return taken.sort_index(level="value")
 
 
-def _draw(sweep: LawSweep, target: Path, file: str) -> str:
+def _draw(sweep: FormulationSweep, target: Path, file: str) -> str:
     _, name = error_column(sweep.rows)
     quantities = {
         "error": f"rms {name} [mm],\nmedian",
@@ -107,7 +111,7 @@ def _draw(sweep: LawSweep, target: Path, file: str) -> str:
     table, scale = per_family(sweep), ValueScale(sweep.rows["value"])
     table["error"] = table["error"].clip(lower=1e3 * LEAST_ERROR)
     finite = table.where(table < float("inf"))
-    panels = in_panels(list(dict.fromkeys(sweep.rows["family"])))
+    panels = in_panels(list(dict.fromkeys(sweep.rows["scenario_family"])))
     figure, axes = plt.subplots(
         len(panels),
         len(quantities),
@@ -128,7 +132,7 @@ def _draw(sweep: LawSweep, target: Path, file: str) -> str:
     logarithmic(axes[0, 1], "y")
     axes[0, 2].set_ylim(-4, 104)
     scale.label(list(axes.flat))
-    figure.supxlabel(f"{short(sweep.parameter)} of {short(sweep.law)}", fontsize=8)
+    figure.supxlabel(f"{short(sweep.parameter)} of {short(sweep.formulation)}", fontsize=8)
     return save(figure, target, file)
 
 

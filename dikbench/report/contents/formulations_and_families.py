@@ -1,4 +1,4 @@
-"""The laws and the families of a run, as a page describes them."""
+"""The formulations and the families of a run, as a page describes them."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ import pandas as pd
 
 from dikbench.plugins.built_scenarios import built
 from dikbench.plugins.registry import plugins
+from dikbench.report.contents.bibliography import references
 from dikbench.report.contents.docstring import Docstring, parse_docstring
-from dikbench.report.contents.references import references
+from dikbench.results.columns import SELECTORS
+from dikbench.results.selected import parameters_of
 from dikbench.scenario.oracle import ORACLE
-from dikbench.selector import parse_selector
 
 MOST_CERTIFICATES: Final = 40
 """Scenarios of a family whose certificates are shown."""
@@ -23,7 +24,7 @@ MOST_CERTIFICATES: Final = 40
 
 @dataclass(frozen=True)
 class Variant:
-    """A law as it was run.
+    """A formulation as it was run.
 
     Attributes:
         selector: as the user wrote it.
@@ -37,11 +38,11 @@ class Variant:
 
 
 @dataclass(frozen=True)
-class Law:
-    """A law of a run.
+class FormulationOfRun:
+    """A formulation of a run.
 
     Attributes:
-        name: of the law, or path/to/file.py:Class.
+        name: of the formulation, or path/to/file.py:Class.
         text: its docstring; None where it cannot be found here.
         variants: as it was run.
         references: what the keys of its source stand for.
@@ -87,42 +88,48 @@ class Family:
     variation: str
 
 
-def laws_of(trials: pd.DataFrame) -> list[Law]:
-    """The laws of a run in its order, the oracle last."""
+def formulations_of(trials: pd.DataFrame) -> list[FormulationOfRun]:
+    """The formulations of a run in its order, the oracle last."""
     solvers: dict[str, list[str]] = {}
     for selector, solver in zip(trials["formulation"], trials["solver"], strict=True):
         with_ = solvers.setdefault(selector, [])
         if solver not in ("none", *with_):
             with_.append(solver)
-    groups: dict[str, list[str]] = {}
-    for selector in solvers:
-        groups.setdefault(parse_selector(selector).name, []).append(selector)
+    parameters = parameters_of(trials, "formulation")
     found = []
-    for name in sorted(groups, key=lambda name: name == ORACLE):
+    for name, selectors in sorted(
+        _by_name(trials, "formulation").items(), key=lambda item: item[0] == ORACLE
+    ):
         text, defaults, file = _described(name)
         variants = tuple(
             Variant(
                 selector,
                 tuple(solvers[selector]),
-                {**defaults, **parse_selector(selector).parameters},
+                {**defaults, **{key: str(value) for key, value in parameters[selector].items()}},
             )
-            for selector in groups[name]
+            for selector in selectors
         )
         parsed = None if text is None else parse_docstring(text)
         cited = references(file, parsed.titled.get("Source", "")) if parsed else ()
-        found.append(Law(name, parsed, variants, cited))
+        found.append(FormulationOfRun(name, parsed, variants, cited))
     return found
 
 
-def _described(name: str) -> tuple[str | None, dict[str, str], Path | None]:
-    """Docstring, default values and file of a law.
+def _by_name(trials: pd.DataFrame, column: str) -> dict[str, list[str]]:
+    """Group the selectors of a column by the name of what they select, in their order."""
+    named = trials.drop_duplicates(column).groupby(f"{column}_{SELECTORS[column]}", sort=False)
+    return {str(name): list(selectors) for name, selectors in named[column]}
 
-    A law that is given as a file is read and not executed: results are data, and remaking their
-    report must not run what they name.
+
+def _described(name: str) -> tuple[str | None, dict[str, str], Path | None]:
+    """Docstring, default values and file of a formulation.
+
+    A formulation that is given as a file is read and not executed: results are data, and remaking
+    their report must not run what they name.
     """
     if name == ORACLE:
         return (
-            "The joint motion from which a scenario's path was built, scored like a law.",
+            "The joint motion from which a scenario's path was built, scored like a formulation.",
             {},
             None,
         )
@@ -162,12 +169,9 @@ def _read(file: Path, class_name: str) -> tuple[str | None, dict[str, str]]:
 def families_of(trials: pd.DataFrame) -> list[Family]:
     """The families of a run in its order, with the certificates of their scenarios."""
     seed = int(trials["seed"].min())
-    groups: dict[str, list[str]] = {}
-    for selector in trials["scenario"].unique():
-        groups.setdefault(parse_selector(selector).name, []).append(selector)
     known = plugins("scenario")
     found = []
-    for name, selectors in groups.items():
+    for name, selectors in _by_name(trials, "scenario").items():
         plugin = known.get(name)
         certified, variation = _certified(selectors[:MOST_CERTIFICATES], seed)
         found.append(

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 import pandas as pd
 
-OUTCOMES: Final = ("ok", "slow", "off course", "violating", "failed")
+CATEGORIES: Final = ("ok", "slow", "off course", "violating", "failed")
 """From the best to the worst; a trial is the worst that applies."""
 
 SLOW: Final = 0.9
@@ -20,8 +20,8 @@ VIOLATING: Final = 0.0
 """... and violating if more than this share of its steps pass a limit (by > 1e-4)."""
 
 
-def outcomes(rows: pd.DataFrame) -> pd.Series:
-    """The outcome of each trial, as its place in `OUTCOMES`."""
+def categories(rows: pd.DataFrame) -> pd.Series:
+    """The outcome of each trial, as its place in `CATEGORIES`."""
     conditions = [
         rows["status"].ne("ok"),
         rows["violating_share"].gt(VIOLATING),

@@ -13,20 +13,21 @@ import pandas as pd
 from dikbench.arrays import Array, Mask
 from dikbench.metrics import METRICS
 from dikbench.report.tables.kinds import Quantity, Statistic
-from dikbench.report.tables.table import DIGITS, Cell, Column
+from dikbench.report.tables.table import DIGITS, Column, TableCell
 from dikbench.scenario.oracle import ORACLE
 from dikbench.statistics.hierarchical_bootstrap import draw_weights, mean_intervals
-from dikbench.statistics.problems import ProblemMatrix
 from dikbench.statistics.shifted_mean import shift_near_median, shifted_geometric_mean
+from dikbench.statistics.trial_matrix import TrialMatrix
 
-NEGLIGIBLE = 1e-6
-"""What is smaller than this [m, rad, rad/s, a share] is as good as 0 when laws are compared."""
+SMALLEST_DIFFERENCE = 1e-6
+"""What is smaller than this [m, rad, rad/s, a share] is as good as 0 when formulations are
+compared."""
 
 _AVERAGES = (Statistic.GEOMETRIC_MEAN, Statistic.MEAN)
 
 
 def describe(quantity: Quantity, rows: pd.DataFrame) -> Column:
-    """The column of a quantity; its shift is near the median over all trials of all laws."""
+    """The column of a quantity; its shift is near the median over all trials."""
     metric = METRICS.get(quantity.of)
     better: Literal["low", "high"] | None = None
     if quantity.compared:
@@ -51,39 +52,39 @@ class Sample:
     """The trials of a block.
 
     Attributes:
-        rows: of trials, with the columns `family` and `failed`, and failures at their worst; a
-            law has one per problem.
-        layout: where each stands in a matrix of problems x laws.
+        rows: of trials, with the columns `scenario_family` and `failed`, and failures at their
+            worst; a formulation has one per case.
+        layout: where each stands in a matrix of problems x formulations.
         weights: the resamples of its problems.
-        unstable: whether the numbers of each law are times that cannot be trusted.
+        unstable: whether the numbers of each formulation are times that cannot be trusted.
     """
 
     rows: pd.DataFrame
-    layout: ProblemMatrix
+    layout: TrialMatrix
     weights: Array
     unstable: Mask
 
     @classmethod
     def of(cls, rows: pd.DataFrame, unstable: Mask) -> Sample:
         """Lay out rows and draw their resamples."""
-        layout = ProblemMatrix.of(rows)
-        families = dict(zip(rows["scenario"], rows["family"], strict=True))
-        scenarios = list(layout.problems["scenario"])
+        layout = TrialMatrix.of(rows)
+        families = dict(zip(rows["scenario"], rows["scenario_family"], strict=True))
+        scenarios = list(layout.cases["scenario"])
         weights = draw_weights([families[name] for name in scenarios], scenarios)
         return cls(rows, layout, weights, unstable)
 
-    def cells(self, quantity: Quantity, column: Column) -> list[Cell]:
-        """The cells of a column, one per law."""
+    def cells(self, quantity: Quantity, column: Column) -> list[TableCell]:
+        """The cells of a column, one per formulation."""
         matrix = self.layout.fill(self.rows[quantity.of].to_numpy(dtype=float))
         if quantity.statistic in _AVERAGES:
             matrix[np.isinf(matrix)] = nan  # of failures: an average cannot carry them
-        values = [_taken(quantity.statistic, column, law) for law in matrix.T]
+        values = [_taken(quantity.statistic, column, contender) for contender in matrix.T]
         intervals = np.full((len(values), 2), nan)
         if column.interval:
             intervals = self._intervals(matrix, column.shift)
         best = self._best(values, self._competes(matrix), column.better)
         return [
-            Cell(value, float(low), float(high), first, bool(unstable))
+            TableCell(value, float(low), float(high), first, bool(unstable))
             for value, (low, high), first, unstable in zip(
                 values, intervals, best, self.unstable, strict=True
             )
@@ -99,18 +100,19 @@ class Sample:
     def _competes(self, matrix: Array) -> Mask:
         """Whether each law has a number wherever one was measured of any law that came through.
 
-        The average over the scenarios that a law survived is no win. The oracle is no law.
+        The average over the scenarios that a formulation survived is no win. The oracle is no
+        formulation.
         """
-        law = (self.layout.laws["formulation"] != ORACLE).to_numpy()
+        contender = (self.layout.contenders["formulation"] != ORACLE).to_numpy()
         came_through = self.layout.fill(1 - self.rows["failed"].to_numpy(dtype=float), 0.0) > 0
         has = ~np.isnan(matrix)
-        asked = (has & came_through)[:, law].any(axis=1, keepdims=True)
-        competes: Mask = law & (has | ~asked).all(axis=0)
+        asked = (has & came_through)[:, contender].any(axis=1, keepdims=True)
+        competes: Mask = contender & (has | ~asked).all(axis=0)
         return competes
 
     @staticmethod
     def _best(values: Sequence[float], competes: Mask, better: str | None) -> list[bool]:
-        """Which laws are the best, to what counts; none where all are equally good."""
+        """Which formulations are the best, to what counts; none where all are equally good."""
         merits = [_merit(value) for value in values]
         competing = {merit for merit, one in zip(merits, competes, strict=True) if one}
         competing = {merit for merit in competing if not isnan(merit)}
@@ -121,12 +123,12 @@ class Sample:
 
 
 def _merit(value: float) -> float:
-    """A number as far as it counts when laws are compared."""
-    return 0.0 if abs(value) < NEGLIGIBLE else float(f"{value:.{DIGITS}g}")
+    """A number as far as it counts when formulations are compared."""
+    return 0.0 if abs(value) < SMALLEST_DIFFERENCE else float(f"{value:.{DIGITS}g}")
 
 
 def _taken(statistic: Statistic, column: Column, values: Array) -> float:
-    """A number from those of one law's trials, NaN where none is defined."""
+    """A number from those of one formulation's trials, NaN where none is defined."""
     defined = values[~np.isnan(values)]
     if statistic is Statistic.NUMBER:
         return float(defined.sum())

@@ -1,0 +1,111 @@
+"""The plan of a study: every trial that it asks for, each once."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import Final
+
+import msgspec
+
+from dikbench.errors import DikbenchError
+from dikbench.plugins.registry import (
+    make_formulation,
+    make_plant,
+    make_scenario,
+    scenario_parameters,
+)
+from dikbench.problem.problem import program_of
+from dikbench.scenario.oracle import ORACLE
+from dikbench.selector import Selector, parse_selector
+from dikbench.solvers.catalogue.back_ends import parse_solver, why_not
+from dikbench.study.identity import trial_id
+from dikbench.study.split import check_split
+from dikbench.study.study import Study, load_study
+from dikbench.study.trial import NO_SOLVER, Trial
+
+SCENARIOS_BUILT_FIRST: Final = 40
+"""Scenarios of a study that are built before anything runs; of the others, in studies with
+hundreds, the parameters are checked, and a certificate that fails makes a skipped row."""
+
+IDEAL: Final = Selector("ideal")
+
+
+class PlannedTrial(msgspec.Struct, frozen=True):
+    """A trial, its id, and why it cannot run, if it cannot."""
+
+    id: str
+    trial: Trial
+    skip: str = ""
+
+
+def expand(study: Study) -> list[PlannedTrial]:
+    """List every trial of a study, in a fixed order, each once.
+
+    Names, parameters and solvers are checked, and the first scenarios are built, so that a mistake
+    shows before anything runs. A formulation and a solver that cannot work together stay in the
+    plan, with the reason.
+
+    Raises:
+        DikbenchError: on the first selector that does not name anything valid.
+    """
+    scenarios = [parse_selector(text) for text in study.scenarios]
+    all_plants = [parse_selector(text) for text in study.plants]
+    for number, scenario in enumerate(scenarios):
+        if number < SCENARIOS_BUILT_FIRST:
+            make_scenario(scenario, study.seeds[0])
+        else:
+            scenario_parameters(scenario)
+    for plant in all_plants:
+        make_plant(plant)
+    _check_split(study, scenarios)
+    _check_timing(study)
+    planned: dict[str, PlannedTrial] = {}
+    for cells in study.cells:
+        for formulation in map(parse_selector, cells.formulations):
+            is_oracle = formulation.name == ORACLE
+            # Nothing is fed back to the oracle: there is one way to run it.
+            plants = [IDEAL] if is_oracle else all_plants
+            references = ("time",) if is_oracle else study.references
+            for solver, skip in _solvers_for(study, formulation, cells.solvers):
+                for scenario, plant, reference, seed in itertools.product(
+                    scenarios, plants, references, study.seeds
+                ):
+                    trial = Trial(formulation, scenario, solver, plant, reference, seed)
+                    name = trial_id(trial)
+                    planned.setdefault(name, PlannedTrial(name, trial, skip))
+    return list(planned.values())
+
+
+def _check_split(study: Study, scenarios: Sequence[Selector]) -> None:
+    if study.split:
+        other = load_study("test" if study.split == "train" else "train")
+        reserved = [parse_selector(text) for text in other.scenarios]
+        check_split(study.name, study.split, scenarios, study.seeds, reserved)
+
+
+def _check_timing(study: Study) -> None:
+    if study.timing is None:
+        return
+    reference = parse_selector(study.timing.reference)
+    if reference.name == ORACLE or program_of(make_formulation(reference)):
+        raise DikbenchError(
+            f"study {study.name}: timing.reference {str(reference)!r} must be a formulation that "
+            "needs no solver, such as 'dls'"
+        )
+
+
+def _solvers_for(
+    study: Study, formulation: Selector, solvers: Sequence[str]
+) -> list[tuple[Selector, str]]:
+    """Return the solvers with which a formulation runs, each with the reason if it cannot."""
+    program = None if formulation.name == ORACLE else program_of(make_formulation(formulation))
+    parsed = [(parse_selector(text), parse_solver(text)) for text in solvers]
+    if program is None:
+        return [(NO_SOLVER, "")]
+    if not parsed:
+        raise DikbenchError(
+            f"study {study.name}: formulation {str(formulation)!r} needs a solver, its cells name "
+            "none"
+        )
+    return [(selector, why_not(solver, program)) for selector, solver in parsed]
