@@ -11,6 +11,7 @@ import numpy as np
 from dikbench.errors import unknown
 from dikbench.metrics import METRICS
 from dikbench.plugins.registry import Plugin, formulation_plugin, make_scenario, plugins
+from dikbench.report.tables.kinds import kinds_with
 from dikbench.robots.catalogue import ROBOTS, load_robot
 from dikbench.scenario.oracle import ORACLE
 from dikbench.selector import parse_selector
@@ -181,11 +182,12 @@ def _robot(name: str) -> str:
 
 def _metric(name: str) -> str:
     metric = METRICS[name]
+    tables = ", ".join(kind.name for kind in kinds_with(name))
     return "\n".join(
         [
             f"{name}: {metric.definition}",
             f"  unit: {metric.unit or 'none'}; best {metric.best}; worst value {metric.worst}",
-            f"  table: {metric.table}",
+            f"  tables: {tables or 'none; a column of trials.csv'}",
             f"  source: {metric.source.strip('[]')}",
         ]
     )
