@@ -17,10 +17,10 @@ from dikbench.metrics.solver import SOLVER
 from dikbench.metrics.tracking import TRACKING
 from dikbench.metrics.violation import VIOLATION
 
-KINDS = (TRACKING, CONTOUR, NULL_SPACE_DRIFT, VIOLATION, CONSTRAINTS, SMOOTHNESS, SOLVER)
+_KINDS = (TRACKING, CONTOUR, NULL_SPACE_DRIFT, VIOLATION, CONSTRAINTS, SMOOTHNESS, SOLVER)
 
 METRICS: Mapping[str, Metric] = MappingProxyType(
-    {metric.name: metric for kind in KINDS for metric in kind}
+    {metric.name: metric for kind in _KINDS for metric in kind}
 )
 """Every metric by its name, in the order of the columns."""
 

@@ -30,7 +30,7 @@ class Recomputed:
     """What became of the trials of a folder; those that were not recomputed keep their values.
 
     Attributes:
-        done: number of trials whose metrics were computed anew.
+        done: number of trials whose metrics were computed again.
         without_trace: number of those that have moved, but whose trace was not kept.
         changed: number of those whose law or scenario is another one today.
         failed: reasons of those whose trace cannot be used, by the name of the trial.
@@ -54,7 +54,7 @@ class Recomputed:
 
 
 def recompute_results(out: Path, jobs: int, command: str) -> Recomputed:
-    """Compute every metric of a results folder again from its traces, and export anew.
+    """Compute every metric of a results folder again from its traces, and export it.
 
     A trial is only recomputed if its law and scenario are still those that it was run with.
 

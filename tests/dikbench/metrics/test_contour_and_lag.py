@@ -151,7 +151,7 @@ def test_a_frame_inside_or_outside_a_circle_has_contour_error_and_no_lag(radius:
     assert got["lag_max_s"] == pytest.approx(0.0, abs=1e-4)
 
 
-def test_off_the_path_and_late_are_told_apart_in_one_motion() -> None:
+def test_off_the_path_and_late_are_distinguished_in_one_motion() -> None:
     """0.1 s late and 3 mm to the side: both, each at its value; the quantile is the 95th."""
     got = evaluate(of(straight(), on(straight(), 0.1, np.array([0.0, 0.0, 3e-3]))))
     assert got["contour_error_max_m"] == pytest.approx(3e-3, abs=1e-9)
