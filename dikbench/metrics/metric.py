@@ -63,16 +63,16 @@ def series_metrics(
     """
 
     def metric(reduction: str) -> Metric:
-        reduced, counts = REDUCTIONS[reduction], reduction in ("share", "steps")
-        own_unit = "" if counts else unit
+        wording, reduce = REDUCTIONS[reduction].wording, REDUCTIONS[reduction].of
+        own_unit = "" if reduction in ("share", "steps") else unit
         low, high = (1.0, 0.0) if reduction == "share" else (INF, -INF)
         return Metric(
             name="_".join(filter(None, (name, reduction, unit_suffix(own_unit)))),
             unit=own_unit,
             best=best,
             worst=worst if worst is not None else low if best == "low" else high,
-            definition=reduced.wording.format(definition),
-            of=lambda motion: reduced.of(values(motion)),
+            definition=wording.format(definition),
+            of=lambda motion: reduce(values(motion)),
             source=source,
         )
 

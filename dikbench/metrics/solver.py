@@ -18,7 +18,9 @@ FALLBACK_STATUSES = (Status.INFEASIBLE, Status.SOLVER_FAILED)
 
 def _has_status(motion: Motion, *statuses: Status) -> Mask:
     """Return which steps have one of these statuses, (n,)."""
-    return np.isin(motion.trace.status, [STEP_CODE[status] for status in statuses])
+    codes = motion.trace.status
+    mask: Mask = np.logical_or.reduce([codes == STEP_CODE[status] for status in statuses])
+    return mask
 
 
 def _share(name: str, status: Status, definition: str) -> tuple[Metric, ...]:

@@ -10,7 +10,6 @@ import numpy as np
 from dikbench.arrays import Array, Mask
 from dikbench.metrics.metric import INF, Metric, series_metrics, unit_suffix
 from dikbench.metrics.motion import Motion
-from dikbench.metrics.reductions import largest
 
 VIOLATION_TOLERANCE: Final = 1e-4
 """A step that passes a limit by less than this [rad, rad/s] is not counted as a violation: that is
@@ -18,9 +17,9 @@ a solver's tolerance, and the largest violation has a column of its own."""
 
 
 def _velocity_usage(motion: Motion) -> float:
-    """Compute the largest joint speed over its limit; NaN where none is in force."""
-    limit = motion.scenario.robot.limits.velocity
-    return float("nan") if limit is None else largest(limit.usage(motion.trace.applied).ravel())
+    """Compute the largest joint speed over its limit; NaN of no step, or without limits."""
+    limit, v = motion.scenario.robot.limits.velocity, motion.trace.applied
+    return float(limit.usage(v).max()) if limit is not None and len(v) else float("nan")
 
 
 def _violation(
