@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from dikbench.errors import unknown
-from dikbench.metrics import METRICS
+from dikbench.metrics import METRICS, Metric
 from dikbench.plugins.registry import Plugin, formulation_plugin, make_scenario, plugins
+from dikbench.report.tables.kinds import kinds_with
 from dikbench.robots.catalogue import ROBOTS, load_robot
 from dikbench.scenario.oracle import ORACLE
 from dikbench.selector import parse_selector
@@ -65,10 +66,11 @@ def _solvers() -> list[tuple[str, str, str]]:
 
 
 def _metrics() -> list[tuple[str, str, str]]:
-    return [
-        (m.name, m.definition, "lower is better" if m.best == "low" else "higher is better")
-        for m in METRICS.values()
-    ]
+    return [(m.name, m.definition, _direction(m)) for m in METRICS.values()]
+
+
+def _direction(metric: Metric) -> str:
+    return "lower is better" if metric.best == "low" else "higher is better"
 
 
 _SUBJECTS: Mapping[str, Callable[[], list[tuple[str, str, str]]]] = {
@@ -184,11 +186,12 @@ def _robot(name: str) -> str:
 
 def _metric(name: str) -> str:
     metric = METRICS[name]
+    tables = ", ".join(kind.name for kind in kinds_with(name))
     return "\n".join(
         [
             f"{name}: {metric.definition}",
-            f"  unit: {metric.unit or 'none'}; best {metric.best}; worst value {metric.worst}",
-            f"  table: {metric.table}",
+            f"  unit: {metric.unit or 'none'}; {_direction(metric)}; worst value {metric.worst}",
+            f"  tables: {tables or 'none; a column of trials.csv'}",
             f"  source: {metric.source.strip('[]')}",
         ]
     )

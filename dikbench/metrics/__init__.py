@@ -1,9 +1,25 @@
-"""The metrics of a trial: pure functions of its recorded motion, never of what a solver said."""
+"""The metrics of a trial, and all that the author of a metric imports.
+
+A metric is a pure function of the recorded motion, never of what a solver said. Most are taken of a
+series (`series_metrics`): a value per step or instant of a `Motion`, reduced to one number.
+"""
 
 from __future__ import annotations
 
 from dikbench.metrics.every import METRICS, evaluate
-from dikbench.metrics.metric import Metric
+from dikbench.metrics.metric import Metric, series_metrics
 from dikbench.metrics.motion import Motion
+from dikbench.metrics.motion_of_trace import motion_of
+from dikbench.metrics.reductions import REDUCTIONS
+from dikbench.metrics.violation import VIOLATION_TOLERANCE
 
-__all__ = ["METRICS", "Metric", "Motion", "evaluate"]
+__all__ = [
+    "METRICS",
+    "REDUCTIONS",
+    "VIOLATION_TOLERANCE",
+    "Metric",
+    "Motion",
+    "evaluate",
+    "motion_of",
+    "series_metrics",
+]

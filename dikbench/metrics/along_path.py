@@ -1,4 +1,4 @@
-"""Where on a path a frame is that follows it: the nearest point, without jumps to other laps."""
+"""Where on a path the frame is that follows it: the nearest point, without jumps to other laps."""
 
 from __future__ import annotations
 
@@ -8,57 +8,58 @@ from typing import Final
 import numpy as np
 
 from dikbench.arrays import Array, Indices
-from dikbench.scenario.reference.path import Path
+from dikbench.scenario.reference.path import ReferencePath
 
-AHEAD: Final = 0.02
-"""The nearest point is looked for so far ahead along the path [m]."""
+SEARCH_AHEAD_M: Final = 0.02
+"""How far ahead along the path the nearest point is searched for."""
 
-NEARER: Final = 1e-3
-"""It goes on farther only where that is nearer by more than this [m] and half a piece."""
+MIN_GAIN_FARTHER_AHEAD_M: Final = 1e-3
+"""A point farther ahead counts only if it is nearer by more than this and half a piece."""
 
-LOOKS: Final = 256
-"""At so many instants of a run, about, the whole way up to the target is looked through."""
+COARSE_SEARCH_INSTANTS: Final = 256
+"""At about this many instants of a run the whole path up to the target is searched."""
 
 
-def follow_path(path: Path, points: Array, targets: Array) -> Array:
-    """How far along a path the points of a motion have come.
+def follow_path(path: ReferencePath, points: Array, targets: Array) -> Array:
+    """Compute how far along a path the points of a motion are.
 
-    The nearest point of the path among those from where the motion was before to where the target
-    is: it never goes back, nor ahead of the target. Farther ahead than `AHEAD` it goes only where
-    that is nearer by more than `NEARER` (a corner that was cut, a way back that began too early),
-    so that a frame that rests, or lags, at a crossing of the path is not taken to be a lap ahead.
+    Each is at the nearest point of the path between where the motion was before and where the
+    target is: it never goes back, nor ahead of the target. It goes farther ahead than
+    `SEARCH_AHEAD_M` only if it is nearer there by more than `MIN_GAIN_FARTHER_AHEAD_M` (a corner
+    that was cut, a return that began too early), so that a frame that rests, or lags, at a crossing
+    of the path is not taken to be a lap ahead.
 
     Args:
         path: a path that is not a point.
         points: of the motion, (n, 3) [m].
-        targets: length of the way to its target at each, not decreasing, (n,) [m].
+        targets: path length to the target of each, not decreasing, (n,) [m].
 
     Returns:
-        Length of the way to the nearest point, not decreasing, (n,) [m].
+        Path length to the nearest point, not decreasing, (n,) [m].
     """
-    looks = np.unique(
-        np.append(np.arange(0, len(points), len(points) // LOOKS + 1), len(points) - 1)
-    )
+    stride = len(points) // COARSE_SEARCH_INSTANTS + 1
+    coarse = np.unique(np.append(np.arange(0, len(points), stride), len(points) - 1))
     arcs = path.vertex_arcs
-    rough = arcs[_vertices(path, points[looks], targets[looks])]
-    start = np.interp(np.arange(len(points)), looks, rough)
+    rough = arcs[_vertices(path, points[coarse], targets[coarse])]
+    start = np.interp(np.arange(len(points)), coarse, rough)
     pieces = np.clip(np.searchsorted(arcs, start, side="right") - 1, 0, len(path.pieces) - 1)
     found = np.minimum(_descend(path, points, pieces), targets)
     along: Array = np.maximum.accumulate(found)
     return along
 
 
-def _vertices(path: Path, points: Array, targets: Array) -> list[int]:
-    """The vertex of the path nearest to each point, by the rules of `follow_path`."""
+def _vertices(path: ReferencePath, points: Array, targets: Array) -> list[int]:
+    """Find the vertex of the path nearest to each point, by the rules of `follow_path`."""
     middle = path.vertices.mean(axis=0)
     V, P = path.vertices - middle, points - middle
     # |V - p|^2 = [|V|^2, -2 V] [1, p] + |p|^2
     Q = np.column_stack([np.einsum("ij,ij->i", V, V), -2 * V])
     asked = np.column_stack([np.ones(len(P)), P])
     sizes = np.einsum("ij,ij->i", P, P).tolist()
-    ends = (np.searchsorted(path.vertex_arcs, targets) + 1).tolist()
-    reach = np.searchsorted(path.vertex_arcs, path.vertex_arcs + AHEAD, side="right").tolist()
-    nearer = NEARER + float(np.diff(path.vertex_arcs).max()) / 2
+    arcs = path.vertex_arcs
+    ends = (np.searchsorted(arcs, targets) + 1).tolist()
+    reach = np.searchsorted(arcs, arcs + SEARCH_AHEAD_M, side="right").tolist()
+    nearer = MIN_GAIN_FARTHER_AHEAD_M + float(np.diff(arcs).max()) / 2
     here, found = 0, []
     for p, size, end in zip(asked, sizes, ends, strict=True):
         squares = Q[here : max(end, here + 1)] @ p
@@ -73,18 +74,18 @@ def _vertices(path: Path, points: Array, targets: Array) -> list[int]:
     return found
 
 
-def _descend(path: Path, points: Array, pieces: Indices) -> Array:
-    """Length of the way [m] to the foot of each point, going from piece to piece while nearer."""
+def _descend(path: ReferencePath, points: Array, pieces: Indices) -> Array:
+    """Compute the path length [m] to the foot of each point, from piece to piece while nearer."""
     last = len(path.pieces) - 1
-    arcs, open_ = np.empty(len(points)), np.arange(len(points))
+    arcs, unsettled = np.empty(len(points)), np.arange(len(points))
     lengths = np.diff(path.vertex_arcs)
-    while len(open_):
-        here = pieces[open_]
+    while len(unsettled):
+        here = pieces[unsettled]
         choice = np.clip(here + np.array([[0], [-1], [1]]), 0, last)  # the piece itself wins a tie
-        shares, squares = path.feet(points[open_], choice)
-        best, each = squares.argmin(axis=0), np.arange(len(open_))
+        shares, squares = path.feet(points[unsettled], choice)
+        best, each = squares.argmin(axis=0), np.arange(len(unsettled))
         chosen = choice[best, each]
-        arcs[open_] = path.vertex_arcs[chosen] + shares[best, each] * lengths[chosen]
-        pieces[open_] = chosen
-        open_ = open_[chosen != here]
+        arcs[unsettled] = path.vertex_arcs[chosen] + shares[best, each] * lengths[chosen]
+        pieces[unsettled] = chosen
+        unsettled = unsettled[chosen != here]
     return arcs

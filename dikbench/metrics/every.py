@@ -17,25 +17,16 @@ from dikbench.metrics.solver import SOLVER
 from dikbench.metrics.tracking import TRACKING
 from dikbench.metrics.violation import VIOLATION
 
+_KINDS = (TRACKING, CONTOUR, NULL_SPACE_DRIFT, VIOLATION, CONSTRAINTS, SMOOTHNESS, SOLVER)
+
 METRICS: Mapping[str, Metric] = MappingProxyType(
-    {
-        metric.name: metric
-        for metric in (
-            *TRACKING,
-            *CONTOUR,
-            *NULL_SPACE_DRIFT,
-            *VIOLATION,
-            *CONSTRAINTS,
-            *SMOOTHNESS,
-            *SOLVER,
-        )
-    }
+    {metric.name: metric for kind in _KINDS for metric in kind}
 )
 """Every metric by its name, in the order of the columns."""
 
 
 def evaluate(motion: Motion) -> dict[str, float]:
-    """Every metric of a motion, by name.
+    """Compute every metric of a motion, by name.
 
     A motion that is not finite came to nothing: each metric has its worst value.
     """

@@ -1,4 +1,4 @@
-"""What a metric is, and the reductions of a motion's arrays to one number."""
+"""What a metric is, and how the metrics of one series are made."""
 
 from __future__ import annotations
 
@@ -6,18 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Literal
 
-import numpy as np
-
 from dikbench.arrays import Array, Mask
 from dikbench.metrics.motion import Motion
-
-Table = Literal["tracking error", "limit violation", "smoothness", "solver"]
+from dikbench.metrics.reductions import REDUCTIONS
 
 INF: Final = float("inf")
 
-NEGLIGIBLE: Final = 1e-4
-"""A step that passes a limit by less than this [rad, rad/s] is not counted as a violation: that is
-a solver's tolerance, and its size stands in the columns beside."""
+Better = Literal["low", "high"]
 
 
 @dataclass(frozen=True)
@@ -25,53 +20,65 @@ class Metric:
     """A number that says how a trial went.
 
     Attributes:
-        name: its column, with the unit at the end.
+        name: its column, with the unit at the end (see `unit_suffix`).
         unit: empty for a share, a ratio or a number of steps.
         best: which direction is better.
         worst: the value of a trial that came to nothing.
-        table: the table in which it stands.
-        definition: one line.
+        definition: what it is, in one line.
         of: computes it; NaN where the motion does not define it.
         source: the paper that it is from, by its key in `formulations/REFERENCES.md`.
     """
 
     name: str
     unit: str
-    best: Literal["low", "high"]
+    best: Better
     worst: float
-    table: Table
     definition: str
     of: Callable[[Motion], float]
     source: str = "dikbench"
 
 
-def rms(values: Array) -> float:
-    """Root mean square; NaN of nothing."""
-    return float(np.sqrt(np.mean(np.square(values)))) if len(values) else float("nan")
+def series_metrics(
+    name: str,
+    unit: str,
+    definition: str,
+    values: Callable[[Motion], Array | Mask],
+    *reductions: str,
+    best: Better = "low",
+    worst: float | None = None,
+    source: str = "dikbench",
+) -> tuple[Metric, ...]:
+    """Make the metrics of one series: a value per step, or at the start and after each step.
+
+    Args:
+        name: how their names begin; the reduction and the unit follow.
+        unit: of the values; a share and a number of steps have none.
+        definition: of the values, such as follows "largest", or "share of the steps".
+        values: computes them from a motion, (k,); a mask for a share or a number of steps.
+        reductions: what is taken of them, names of `REDUCTIONS`, in the order of the columns.
+        best: which direction is better.
+        worst: the value of a trial that came to nothing; without one it is 0 or 1 for a share, and
+            infinite otherwise.
+        source: the paper that they are from.
+    """
+
+    def metric(reduction: str) -> Metric:
+        wording, reduce = REDUCTIONS[reduction].wording, REDUCTIONS[reduction].of
+        own_unit = "" if reduction in ("share", "steps") else unit
+        low, high = (1.0, 0.0) if reduction == "share" else (INF, -INF)
+        return Metric(
+            name="_".join(filter(None, (name, reduction, unit_suffix(own_unit)))),
+            unit=own_unit,
+            best=best,
+            worst=worst if worst is not None else low if best == "low" else high,
+            definition=wording.format(definition),
+            of=lambda motion: reduce(values(motion)),
+            source=source,
+        )
+
+    return tuple(map(metric, reductions))
 
 
-def largest(values: Array) -> float:
-    """The largest of the values that are defined; NaN where none is."""
-    defined = values[~np.isnan(values)]
-    return float(defined.max()) if len(defined) else float("nan")
-
-
-def percentile_95(values: Array) -> float:
-    """What 95 % of the values do not exceed, between two of them in proportion; NaN of nothing."""
-    if not len(values):
-        return float("nan")
-    ordered = np.sort(values)  # np.percentile costs ten times as much
-    place = 0.95 * (len(values) - 1)
-    below = ordered[int(place)]
-    above = ordered[min(int(place) + 1, len(values) - 1)]
-    return float(below + (place - int(place)) * (above - below))
-
-
-def last(values: Array) -> float:
-    """The last one; NaN of nothing."""
-    return float(values[-1]) if len(values) else float("nan")
-
-
-def mean(values: Array | Mask) -> float:
-    """Mean, of a mask the share that is set; NaN of nothing."""
-    return float(np.mean(values)) if len(values) else float("nan")
+def unit_suffix(unit: str) -> str:
+    """How a unit is written at the end of a column's name: rad/s^2 is rad_s2, 1/s is per_s."""
+    return unit.replace("1/", "per_").replace("/", "_").replace(" ", "_").replace("^", "")

@@ -1,4 +1,4 @@
-"""Whether joints come back with the hand: drift in the null space over the laps of a path."""
+"""Whether the joints return with the task frame: drift in the null space over laps of a path."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from dikbench.arrays import Array
 from dikbench.metrics.metric import INF, Metric
 from dikbench.metrics.motion import Motion
 
-PHASES: Final = 8
-"""Configurations are compared at so many phases of a lap."""
+PHASES_PER_LAP: Final = 8
+"""Configurations are compared at this many phases of a lap."""
 
 
 def null_space_drift(motion: Motion) -> float:
-    """Mean distance of the configurations at the same phase of consecutive laps [rad].
+    """Compute the mean distance of configurations at the same phase of consecutive laps [rad].
 
         mean over tau of |q(tau + P) (-) q(tau)|,   tau = t_0, t_0 + P/8, t_0 + 2 P/8, ...
 
@@ -32,7 +32,8 @@ def null_space_drift(motion: Motion) -> float:
     whole = float(tau[-1]) + 0.5 * motion.trace.dt - reference.first_lap - period
     if not whole >= 0 or len(robot.chain) <= len(motion.scenario.rows):
         return float("nan")
-    starts = reference.first_lap + period / PHASES * np.arange(floor(whole / period * PHASES) + 1)
+    count = floor(whole / period * PHASES_PER_LAP) + 1
+    starts = reference.first_lap + period / PHASES_PER_LAP * np.arange(count)
     drifts = []
     for start in starts.tolist():
         moved = pin.difference(robot.model, _at(motion, start), _at(motion, start + period))
@@ -41,7 +42,7 @@ def null_space_drift(motion: Motion) -> float:
 
 
 def _at(motion: Motion, tau: float) -> Array:
-    """The configuration when the reference is first at a nominal time [s], (nq,)."""
+    """Return the configuration when the reference is first at a nominal time [s], (nq,)."""
     trace = motion.trace
     after = min(max(int(np.searchsorted(trace.tau, tau)), 1), trace.steps)
     span = trace.tau[after] - trace.tau[after - 1]
@@ -53,7 +54,7 @@ def _at(motion: Motion, tau: float) -> Array:
 
 NULL_SPACE_DRIFT = (
     Metric(
-        "null_space_drift_per_lap_rad", "rad", "low", INF, "tracking error",
+        "null_space_drift_per_lap_rad", "rad", "low", INF,
         "mean distance of the configurations at the same phase of consecutive laps",
         null_space_drift,
         "[KleinHuang1983]",

@@ -1,4 +1,4 @@
-"""How smooth the joint motion is: jerk, reversals, and what is in its spectrum."""
+"""How smooth the joint motion is: its jerk, its reversals, and the energy above 10 Hz."""
 
 from __future__ import annotations
 
@@ -7,73 +7,78 @@ from typing import Final
 import numpy as np
 
 from dikbench.arrays import Array
-from dikbench.metrics.metric import INF, NEGLIGIBLE, Metric
+from dikbench.metrics.metric import INF, Metric
 from dikbench.metrics.motion import Motion
 from dikbench.metrics.sparc import sparc
 
-DEAD_BAND: Final = 0.1
-"""An acceleration below this [rad/s^2] has no sign: rounding does not reverse."""
+ACCELERATION_DEAD_BAND_RAD_S2: Final = 0.1
+"""An acceleration below this has no sign: rounding is no reversal."""
 
-CHATTER: Final = 10.0
-"""Above this frequency [Hz] no scenario asks for motion."""
+CHATTER_FREQUENCY_HZ: Final = 10.0
+"""Above this frequency no scenario asks for motion."""
 
-PERIODS: Final = 2
-"""Of this frequency a run must hold so many for its spectrum to tell."""
+MIN_PERIODS: Final = 2
+"""The spectrum of a run is only looked at if it is this many periods of the frequency long."""
+
+NEGLIGIBLE_SPEED_RAD_S: Final = 1e-4
+"""A motion whose joint velocities vary by less than this is steady."""
 
 
 def jerk_rms_scaled(motion: Motion) -> float:
-    """RMS jerk times T^3 / A: how a motion of this duration and amplitude might have been smoother.
+    """Compute the RMS jerk times T^3 / A, which compares motions of any duration and amplitude.
 
         sqrt(mean |j_k|^2) T^3 / A,   j_k = (v_k+1 - 2 v_k + v_k-1) / dt^2
 
     with T the duration and A = |max q_i - min q_i| the extent of the joint motion. It is the square
     root of the dimensionless jerk, T^5/A^2 int |j|^2 dt: 26.8 for a single minimum-jerk movement.
-    NaN for less than two steps, and at rest.
+    NaN for fewer than two steps, and at rest.
     """
     q = np.cumsum(motion.trace.applied, axis=0) * motion.trace.dt
     extent = q.max(axis=0, initial=0.0) - q.min(axis=0, initial=0.0)
     amplitude, duration = float(np.linalg.norm(extent)), motion.trace.steps * motion.trace.dt
     jerk = np.diff(motion.accelerations, axis=0) / motion.trace.dt
-    if not len(jerk) or amplitude <= NEGLIGIBLE * motion.trace.dt:
+    if not len(jerk) or amplitude <= NEGLIGIBLE_SPEED_RAD_S * motion.trace.dt:
         return float("nan")
     return float(np.sqrt(np.sum(np.square(jerk)) / len(jerk)) * duration**3 / amplitude)
 
 
 def acceleration_variation(motion: Motion) -> float:
-    """Sum over joints and steps of |a_k+1 - a_k| [rad/s^2]."""
+    """Compute the sum over joints and steps of |a_k+1 - a_k| [rad/s^2]."""
     return float(np.abs(np.diff(motion.accelerations, axis=0)).sum())
 
 
 def reversals(motion: Motion) -> float:
-    """Sign flips of dv/dt of the joint that has most of them, per second.
+    """Count the sign changes of dv/dt of the joint that has most of them, per second.
 
-    From one acceleration above `DEAD_BAND` to the next of the other sign, however long it takes.
+    Each is from one acceleration outside the dead band to the next of the other sign, however many
+    inside it are between them.
     """
     if not motion.trace.steps:
         return float("nan")
     flips = 0
     for a in motion.accelerations.T:
-        rising = a[np.abs(a) > DEAD_BAND] > 0
+        rising = a[np.abs(a) > ACCELERATION_DEAD_BAND_RAD_S2] > 0
         flips = max(flips, int(np.count_nonzero(rising[1:] != rising[:-1])))
     return flips / (motion.trace.steps * motion.trace.dt)
 
 
-def energy_above(motion: Motion, frequency: float = CHATTER) -> float:
-    """Share of the energy of v above a frequency [Hz], all joints together.
+def energy_above(motion: Motion, frequency: float = CHATTER_FREQUENCY_HZ) -> float:
+    """Compute the share of the energy of v above a frequency [Hz], all joints together.
 
-    Each joint's straight line is taken off and a Hann window put on, so that neither a drift nor
-    the ends of the run pass for chatter. 0 where v varies by less than 1e-4 rad/s; NaN for a run of
-    less than 0.2 s or steps of 0.05 s and more, in which there are no such frequencies.
+    The straight line of least squares is subtracted from each joint's velocity and a Hann window
+    applied, so that neither a drift nor the ends of the run count as chatter. 0 where v varies by
+    less than 1e-4 rad/s; NaN for a run of less than 0.2 s or steps of 0.05 s and more, in which
+    there are no such frequencies.
     """
     v, dt = motion.trace.applied, motion.trace.dt
     n = len(v)
-    if n * dt < PERIODS / frequency or dt * frequency * 2 >= 1:
+    if n * dt < MIN_PERIODS / frequency or dt * frequency * 2 >= 1:
         return float("nan")
-    around = _detrended(v)
-    if np.abs(around).max() < NEGLIGIBLE:
+    varying = _detrended(v)
+    if np.abs(varying).max() < NEGLIGIBLE_SPEED_RAD_S:
         return 0.0
     window = 0.5 - 0.5 * np.cos(2 * np.pi * (np.arange(n) + 0.5) / n)
-    spectrum = np.fft.rfft(around * window[:, None], axis=0)
+    spectrum = np.fft.rfft(varying * window[:, None], axis=0)
     energy = np.sum(spectrum.real**2 + spectrum.imag**2, axis=1)
     energy[1 : (n + 1) // 2] *= 2  # all but the mean and half the sampling rate stand for two
     fast = np.arange(len(energy)) > frequency * n * dt
@@ -81,38 +86,38 @@ def energy_above(motion: Motion, frequency: float = CHATTER) -> float:
 
 
 def _detrended(v: Array) -> Array:
-    """The columns of v (n, nv) about their straight lines of least squares."""
+    """Subtract their straight lines of least squares from the columns of v (n, nv)."""
     t = np.arange(len(v)) - (len(v) - 1) / 2
-    around: Array = v - v.mean(axis=0)
-    around -= np.outer(t, (t @ around) / (t @ t))
-    return around
+    varying: Array = v - v.mean(axis=0)
+    varying -= np.outer(t, (t @ varying) / (t @ t))
+    return varying
 
 
 SMOOTHNESS = (
     Metric(
-        "jerk_rms_scaled", "", "low", INF, "smoothness",
+        "jerk_rms_scaled", "", "low", INF,
         "RMS joint jerk times T^3 / A, duration T, extent A: root of the dimensionless jerk",
         jerk_rms_scaled,
         "[HoganSternad2009]",
     ),
     Metric(
-        "acceleration_variation_rad_s2", "rad/s^2", "low", INF, "smoothness",
+        "acceleration_variation_rad_s2", "rad/s^2", "low", INF,
         "total variation of the joint accelerations, summed over joints",
         acceleration_variation,
     ),
     Metric(
-        "reversals_per_s", "1/s", "low", INF, "smoothness",
-        "sign flips of dv/dt per second, beyond 0.1 rad/s^2, of the joint with most of them",
+        "reversals_per_s", "1/s", "low", INF,
+        "sign changes of dv/dt per second, beyond 0.1 rad/s^2, of the joint with most of them",
         reversals,
     ),
     Metric(
-        "energy_above_10_hz_share", "", "low", 1.0, "smoothness",
-        "share of the energy of the joint velocities above 10 Hz, without their straight lines",
+        "energy_above_10_hz_share", "", "low", 1.0,
+        "share of the energy of the joint velocities above 10 Hz, less their linear trends",
         energy_above,
     ),
     Metric(
-        "sparc", "", "high", -INF, "smoothness",
-        "spectral arc length of the joint speed |v|; blind above 10 Hz, where control chatters",
+        "sparc", "", "high", -INF,
+        "spectral arc length of the joint speed |v|; chatter above 10 Hz does not show in it",
         lambda m: sparc(np.linalg.norm(m.trace.applied, axis=1), m.trace.dt),
         "[Balasubramanian2015]",
     ),

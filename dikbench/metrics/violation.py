@@ -2,89 +2,88 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Final
+
 import numpy as np
 
-from dikbench.arrays import Array
-from dikbench.metrics.metric import INF, NEGLIGIBLE, Metric, largest, mean
+from dikbench.arrays import Array, Mask
+from dikbench.metrics.metric import INF, Metric, series_metrics, unit_suffix
 from dikbench.metrics.motion import Motion
 
-
-def _peak_ratio(motion: Motion) -> float:
-    limit = motion.scenario.robot.limits.velocity
-    v = motion.trace.applied
-    if limit is None or not len(v):
-        return float("nan")
-    return float(limit.usage(v).max())
+VIOLATION_TOLERANCE: Final = 1e-4
+"""A step that passes a limit by less than this [rad, rad/s] is not counted as a violation: that is
+a solver's tolerance, and the largest violation has a column of its own."""
 
 
-def _violating_share(motion: Motion) -> float:
-    excess = np.maximum(motion.position_excess[1:], motion.velocity_excess)
-    return mean(excess > NEGLIGIBLE)
+def _velocity_usage(motion: Motion) -> float:
+    """Compute the largest joint speed over its limit; NaN of no step, or without limits."""
+    limit, v = motion.scenario.robot.limits.velocity, motion.trace.applied
+    return float(limit.usage(v).max()) if limit is not None and len(v) else float("nan")
 
 
-def _acceleration_share(motion: Motion) -> float:
-    """A change of velocity by up to `NEGLIGIBLE` too much is a solver's tolerance."""
-    return mean(motion.acceleration_excess > NEGLIGIBLE / motion.trace.dt)
+def _violation(
+    quantity: str,
+    units: tuple[str, str],
+    definition: str,
+    excess: Callable[[Motion], Array],
+    steps: str,
+    tolerance: Callable[[Motion], float] = lambda _: VIOLATION_TOLERANCE,
+) -> tuple[Metric, ...]:
+    """Make the metrics of one kind of limit: its largest violation, how often, and the integral.
+
+    Args:
+        quantity: what is limited.
+        units: of the excess, and of its time integral.
+        definition: of the excess, such as follows "largest".
+        excess: how far beyond its limit the worst joint is, in each step, and perhaps at the start.
+        steps: which steps count as violating, such as follows "share of the steps".
+        tolerance: the excess from which a step counts.
+    """
+    name = f"{quantity}_violation"
+
+    def in_steps(motion: Motion) -> Array:
+        """Return the excess of each step, (n,), without that at the start."""
+        values = excess(motion)
+        return values[len(values) - motion.trace.steps :]
+
+    return (
+        *series_metrics(name, units[0], definition, excess, "max"),
+        *series_metrics(name, "", steps, lambda m: in_steps(m) > tolerance(m), "share"),
+        Metric(
+            f"{name}_integral_{unit_suffix(units[1])}", units[1], "low", INF,
+            f"time integral of the largest {definition}",
+            lambda m: float(in_steps(m).sum()) * m.trace.dt,
+        ),
+    )  # fmt: skip
 
 
-def _integral(excess: Array, motion: Motion) -> float:
-    return float(excess.sum()) * motion.trace.dt
+def _violating(motion: Motion) -> Mask:
+    """Return which steps end outside a position limit or are too fast, (n,)."""
+    return np.maximum(motion.position_excess[1:], motion.velocity_excess) > VIOLATION_TOLERANCE
 
 
 VIOLATION = (
     Metric(
-        "velocity_peak_ratio", "", "low", INF, "limit violation",
-        "largest joint speed of the motion over its limit",
-        _peak_ratio,
+        "velocity_peak_ratio", "", "low", INF,
+        "largest joint speed of the motion over its limit", _velocity_usage,
     ),
-    Metric(
-        "position_violation_max_rad", "rad", "low", INF, "limit violation",
-        "largest distance of a joint outside its position limits",
-        lambda m: largest(m.position_excess),
+    *_violation(
+        "position", ("rad", "rad s"), "distance of a joint outside its position limits",
+        lambda m: m.position_excess, "that end outside a position limit by > 1e-4 rad",
     ),
-    Metric(
-        "position_violation_share", "", "low", 1.0, "limit violation",
-        "share of the steps that end outside a position limit by > 1e-4 rad",
-        lambda m: mean(m.position_excess[1:] > NEGLIGIBLE),
+    *_violation(
+        "velocity", ("rad/s", "rad"), "joint speed above its limit",
+        lambda m: m.velocity_excess, "in which a joint is too fast by > 1e-4 rad/s",
     ),
-    Metric(
-        "position_violation_integral_rad_s", "rad s", "low", INF, "limit violation",
-        "time integral of the largest distance of a joint outside its position limits",
-        lambda m: _integral(m.position_excess[1:], m),
+    *_violation(
+        "acceleration", ("rad/s^2", "rad/s"), "joint acceleration above its limit, 0 without one",
+        lambda m: m.acceleration_excess,
+        "whose velocity changes too much, by > 1e-4 rad/s in the step",
+        lambda m: VIOLATION_TOLERANCE / m.trace.dt,
     ),
-    Metric(
-        "velocity_violation_max_rad_s", "rad/s", "low", INF, "limit violation",
-        "largest joint speed above its limit",
-        lambda m: largest(m.velocity_excess),
-    ),
-    Metric(
-        "velocity_violation_share", "", "low", 1.0, "limit violation",
-        "share of the steps in which a joint is too fast by > 1e-4 rad/s",
-        lambda m: mean(m.velocity_excess > NEGLIGIBLE),
-    ),
-    Metric(
-        "velocity_violation_integral_rad", "rad", "low", INF, "limit violation",
-        "time integral of the largest joint speed above its limit",
-        lambda m: _integral(m.velocity_excess, m),
-    ),
-    Metric(
-        "acceleration_violation_max_rad_s2", "rad/s^2", "low", INF, "limit violation",
-        "largest joint acceleration above its limit; 0 where none is in force",
-        lambda m: largest(m.acceleration_excess),
-    ),
-    Metric(
-        "acceleration_violation_share", "", "low", 1.0, "limit violation",
-        "share of the steps whose velocity changes too much, by > 1e-4 rad/s in the step",
-        _acceleration_share,
-    ),
-    Metric(
-        "acceleration_violation_integral_rad_s", "rad/s", "low", INF, "limit violation",
-        "time integral of the largest joint acceleration above its limit",
-        lambda m: _integral(m.acceleration_excess, m),
-    ),
-    Metric(
-        "violating_share", "", "low", 1.0, "limit violation",
-        "share of the steps that end outside a position limit or move too fast, by > 1e-4",
-        _violating_share,
+    *series_metrics(
+        "violating", "", "that end outside a position limit or move too fast, by > 1e-4",
+        _violating, "share",
     ),
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Progress and off course of an achieved twist against a wanted one, in one metric."""
+"""Progress and direction error of an achieved twist against a desired one, in one metric."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ import numpy as np
 from dikbench.arrays import Array
 
 CHARACTERISTIC_LENGTH: Final = 0.2
-"""L [m]: the lever by which angular rows weigh in, M = diag(1, 1, 1, L^2, L^2, L^2)."""
+"""L [m]: the lever that weighs angular rows, M = diag(1, 1, 1, L^2, L^2, L^2)."""
 
-DWELL: Final = 1e-4
-"""Below this |V|_M [m/s] nothing is wanted: the step is a dwell and has no direction."""
+DWELL_SPEED_M_S: Final = 1e-4
+"""Below this |V|_M [m/s] no motion is desired: the step is a dwell and has no direction."""
 
 STUCK_PROGRESS: Final = 0.01
-"""A step that makes less than this share of the wanted motion is stuck."""
+"""A step that makes less than this share of the desired motion is stuck."""
 
-STOPPED: Final = 1e-6
-"""Below this share of |V|_M the robot stands still: stopped, not on course."""
+STANDSTILL_SPEED_SHARE: Final = 1e-6
+"""Below this share of |V|_M the robot stands still, and its motion has no direction."""
 
 
 def row_weights(rows: tuple[int, ...], length: float = CHARACTERISTIC_LENGTH) -> Array:
-    """Square roots of M's diagonal for the rows of a twist that a task keeps, (m,)."""
+    """Return the square roots of M's diagonal for the rows of a twist that a task keeps, (m,)."""
     return np.array([1.0 if row < 3 else length for row in rows])
 
 
 def progress(wanted: Array, achieved: Array, weights: Array) -> Array:
-    """Alpha = <V_a, V>_M / |V|_M^2 per step, (n,); NaN in a dwell; negative means reversal.
+    """Compute alpha = <V_a, V>_M / |V|_M^2 of each step, (n,); NaN in a dwell, < 0 in reverse.
 
     Args:
         wanted: V, (n, m) [m/s; rad/s].
@@ -36,19 +36,19 @@ def progress(wanted: Array, achieved: Array, weights: Array) -> Array:
     """
     V, V_a = wanted * weights, achieved * weights
     size = np.einsum("ij,ij->i", V, V)
-    moving = size >= DWELL**2
+    moving = size >= DWELL_SPEED_M_S**2
     return np.where(moving, np.einsum("ij,ij->i", V_a, V) / np.where(moving, size, 1.0), np.nan)
 
 
 def off_course(wanted: Array, achieved: Array, weights: Array) -> Array:
-    """Angle between the achieved and the wanted twist, (n,) [rad]; NaN in a dwell or stopped.
+    """Compute the angle between the achieved and the desired twist, (n,) [rad].
 
-    acos(<V_a, V>_M / (|V_a|_M |V|_M)), computed by atan2 of the part across and the part along,
-    which does not lose small angles.
+    NaN in a dwell and where the robot stands still. It is acos(<V_a, V>_M / (|V_a|_M |V|_M)),
+    computed by atan2 of the part across and the part along, which does not lose small angles.
     """
     V, V_a = wanted * weights, achieved * weights
     size, size_a = np.linalg.norm(V, axis=1), np.linalg.norm(V_a, axis=1)
-    defined = (size >= DWELL) & (size_a >= STOPPED * size)
+    defined = (size >= DWELL_SPEED_M_S) & (size_a >= STANDSTILL_SPEED_SHARE * size)
     direction = V / np.where(defined, size, 1.0)[:, None]
     along = np.einsum("ij,ij->i", V_a, direction)
     across = np.linalg.norm(V_a - along[:, None] * direction, axis=1)

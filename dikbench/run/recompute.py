@@ -1,4 +1,4 @@
-"""All metrics anew from stored traces: a new metric, or a mended one, needs no rerun."""
+"""Computes all metrics again from stored traces: a new or a mended metric needs no rerun."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from dikbench.errors import DikbenchError
-from dikbench.metrics import evaluate
-from dikbench.metrics.motion import recompute
+from dikbench.metrics import evaluate, motion_of
 from dikbench.results.folder import ResultsFolder
 from dikbench.results.store import Store, StoredTrial
 from dikbench.run.pool import workers
@@ -31,7 +30,7 @@ class Recomputed:
     """What became of the trials of a folder; those that were not recomputed keep their values.
 
     Attributes:
-        done: number of trials whose metrics were computed anew.
+        done: number of trials whose metrics were computed again.
         without_trace: number of those that have moved, but whose trace was not kept.
         changed: number of those whose formulation or scenario is another one today.
         failed: reasons of those whose trace cannot be used, by the name of the trial.
@@ -55,7 +54,7 @@ class Recomputed:
 
 
 def recompute_results(out: Path, jobs: int, command: str) -> Recomputed:
-    """Compute every metric of a results folder again from its traces, and export anew.
+    """Compute every metric of a results folder again from its traces, and export it.
 
     A trial is only recomputed if its formulation and scenario are still those that it was run with.
 
@@ -139,7 +138,7 @@ def metrics_of(stored: StoredTrial, file: Path) -> dict[str, float]:
     scenario = scenario_of(stored.trial.scenario, stored.trial.seed)
     trace = Trace.load(file)
     _check_fits(trace, scenario, stored.steps, file)
-    return evaluate(recompute(trace, scenario))
+    return evaluate(motion_of(trace, scenario))
 
 
 def _check_fits(trace: Trace, scenario: Scenario, steps: int, file: Path) -> None:

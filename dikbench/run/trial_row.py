@@ -10,8 +10,7 @@ from time import perf_counter
 from typing import Any, Literal
 
 from dikbench.errors import DikbenchError
-from dikbench.metrics import evaluate
-from dikbench.metrics.motion import recompute
+from dikbench.metrics import evaluate, motion_of
 from dikbench.plugins.registry import make_formulation, make_plant, make_scenario
 from dikbench.problem.problem import program_of
 from dikbench.run.provenance import environment
@@ -138,7 +137,7 @@ def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "al
     metrics: Mapping[str, float] = {}
     if run.trace.steps:
         seen = None if plant.noise else run.jacobians  # with noise, not those of the true motion
-        metrics = evaluate(recompute(run.trace, scenario, seen))
+        metrics = evaluate(motion_of(run.trace, scenario, seen))
     return {
         **trial.row,
         "status": run.status.value,

@@ -15,7 +15,7 @@ from dikbench.problem.tasks import Task, TrackingTask, TrackingTogether
 from dikbench.robots.robot import Robot
 from dikbench.scenario.certificate import Certificate
 from dikbench.scenario.oracle import OracleMotion, follow
-from dikbench.scenario.reference.path import Path, path_of
+from dikbench.scenario.reference.path import ReferencePath, reference_path
 from dikbench.scenario.reference.reference import Reference
 from dikbench.scenario.steps import steps_in
 from dikbench.scenario.variation import NO_VARIATION, Variation
@@ -94,11 +94,12 @@ class Scenario:
         return rotations, np.array([X.translation for X, _ in self.targets])
 
     @cached_property
-    def path(self) -> Path | None:
+    def path(self) -> ReferencePath | None:
         """The path of the reference, as far as any run goes; None for a target at rest."""
         if not self.reference.moving:
             return None
-        return path_of(self.reference, max(self.reference.duration, self.steps * self.dt), self.dt)
+        end = max(self.reference.duration, self.steps * self.dt)
+        return reference_path(self.reference, end, self.dt)
 
     @cached_property
     def oracle(self) -> Array | None:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dikbench.arrays import Array
-from dikbench.metrics.metric import NEGLIGIBLE
+from dikbench.metrics import VIOLATION_TOLERANCE
 from dikbench.robots.limits import JointLimits
 from dikbench.simulation.trace import Trace
 
@@ -28,7 +28,7 @@ class Nearness(IntEnum):
 def nearness(trace: Trace, limits: JointLimits) -> npt.NDArray[np.int_]:
     """The nearness of every joint, (n + 1, nv): before each step, with its speed, and at the end.
 
-    A joint is past a limit where it is so by more than `NEGLIGIBLE`, as in the metrics.
+    A joint is past a limit where it is so by more than `VIOLATION_TOLERANCE`, as in the metrics.
     """
     use, excess = np.zeros((2, trace.steps + 1, limits.nv))
     position, speed = limits.position, limits.velocity
@@ -42,7 +42,7 @@ def nearness(trace: Trace, limits: JointLimits) -> npt.NDArray[np.int_]:
         too_fast = np.maximum(v - speed.upper, speed.lower - v)
         excess[:-1] = np.maximum(excess[:-1], too_fast)
     near = np.where(use >= NEAR_SHARE, Nearness.NEAR, Nearness.INSIDE)
-    return np.where(excess > NEGLIGIBLE, Nearness.PAST, near)
+    return np.where(excess > VIOLATION_TOLERANCE, Nearness.PAST, near)
 
 
 def _share_of_range(at: Array, lower: Array, upper: Array) -> Array:

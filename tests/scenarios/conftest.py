@@ -6,8 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from dikbench.metrics import evaluate
-from dikbench.metrics.motion import recompute
+from dikbench.metrics import evaluate, motion_of
 from dikbench.plugins.registry import make_formulation, make_plant
 from dikbench.problem import program_of
 from dikbench.scenario import Scenario
@@ -32,6 +31,6 @@ def metrics() -> Metrics:
         solve = make_solve(None if program is None else parse_solver("daqp"), program)
         run = simulate(scenario, formulation, solve, make_plant(plant))
         assert run.status is Status.OK
-        return evaluate(recompute(run.trace, scenario))
+        return evaluate(motion_of(run.trace, scenario))
 
     return of

@@ -13,7 +13,7 @@ import pytest
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.metrics.motion import recompute
+from dikbench.metrics import motion_of
 from dikbench.plugins.registry import make_formulation, make_scenario
 from dikbench.problem import program_of
 from dikbench.problem.constraints import CollisionConstraint
@@ -55,7 +55,7 @@ def _constraint(scenario: Scenario) -> CollisionConstraint:
 
 
 def _errors(run: Run, scenario: Scenario) -> Array:
-    return recompute(run.trace, scenario).position_error
+    return motion_of(run.trace, scenario).position_error
 
 
 @pytest.mark.parametrize("selector", CASES)

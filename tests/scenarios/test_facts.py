@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dikbench.arrays import Array
-from dikbench.metrics.motion import Motion, recompute
+from dikbench.metrics import Motion, motion_of
 from dikbench.plugins.registry import make_formulation, make_scenario
 from dikbench.problem import program_of
 from dikbench.problem.progress import off_course, progress
@@ -33,7 +33,7 @@ def _motion(law: str, scenario: str) -> Motion:
     solve = make_solve(None if program is None else parse_solver("daqp"), program)
     run = simulate(case, formulation, solve, Plant())
     assert run.status is Status.OK
-    return recompute(run.trace, case)
+    return motion_of(run.trace, case)
 
 
 def _peak(motion: Motion) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from dikbench.arrays import Array
-from dikbench.metrics.motion import Motion
+from dikbench.metrics import Motion
 from dikbench.report.drawing.figure import Figure
 from dikbench.report.drawing.style import COLOURS, WIDTH, look, save, short
 from dikbench.report.selection.rows import how, one_way

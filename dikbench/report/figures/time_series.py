@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from dikbench.arrays import Array
-from dikbench.metrics.motion import Motion
+from dikbench.metrics import Motion
 from dikbench.report.drawing.figure import Figure
 from dikbench.report.drawing.style import WIDTH, logarithmic, look, save, short
 from dikbench.report.selection.rows import LEAST_ERROR, how, one_way

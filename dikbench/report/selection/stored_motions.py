@@ -10,7 +10,7 @@ import pandas as pd
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.metrics.motion import Motion, recompute
+from dikbench.metrics import Motion, motion_of
 from dikbench.plugins.registry import make_scenario
 from dikbench.report.selection.rows import error_column, one_way, ranked
 from dikbench.results.folder import ResultsFolder
@@ -46,7 +46,7 @@ def stored_motions(folder: ResultsFolder, ran: pd.DataFrame, scenario: str) -> d
     names = [name for name in ranked(rows, column) if name in files]
     try:
         case = make_scenario(scenario, int(rows["seed"].iloc[0]))
-        return {name: recompute(Trace.load(files[name]), case) for name in names}
+        return {name: motion_of(Trace.load(files[name]), case) for name in names}
     except DikbenchError:  # the results are of another machine, which has more scenarios
         return {}
 

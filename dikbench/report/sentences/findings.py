@@ -9,7 +9,7 @@ from typing import Final
 
 import pandas as pd
 
-from dikbench.metrics.metric import NEGLIGIBLE
+from dikbench.metrics import VIOLATION_TOLERANCE
 from dikbench.report.sentences.paired_wins import SAME, Lead, lead
 from dikbench.report.sentences.words import (
     Contender,
@@ -27,10 +27,10 @@ ON_COURSE: Final = math.radians(1.0)
 """A formulation that is never farther off course than this stays on it."""
 
 KEPT: Final = {
-    "position_violation_max_rad": NEGLIGIBLE,
-    "velocity_violation_max_rad_s": NEGLIGIBLE,
-    "acceleration_violation_max_rad_s2": 1e3 * NEGLIGIBLE,
-    "distance_violation_max_m": NEGLIGIBLE,
+    "position_violation_max_rad": VIOLATION_TOLERANCE,
+    "velocity_violation_max_rad_s": VIOLATION_TOLERANCE,
+    "acceleration_violation_max_rad_s2": 1e3 * VIOLATION_TOLERANCE,
+    "distance_violation_max_m": VIOLATION_TOLERANCE,
     "torque_violating_share": 0.0,
 }
 """Limits that are passed by no more than this are kept: a solver's tolerance; that of velocities,

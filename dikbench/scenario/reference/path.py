@@ -1,4 +1,4 @@
-"""The path of a reference: the way of its origin, as a chain of straight pieces."""
+"""The path of a reference: the curve of its origin, as a chain of straight pieces."""
 
 from __future__ import annotations
 
@@ -10,36 +10,36 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from dikbench.arrays import Array, Indices
-from dikbench.problem.progress import DWELL
+from dikbench.problem.progress import DWELL_SPEED_M_S
 from dikbench.scenario.reference.reference import Reference
 
-CHORD: Final = 1e-6
-"""How far a straight piece may be from the curve that it stands for [m], about."""
+CHORD_ERROR_M: Final = 1e-6
+"""About how far a straight piece may be from the curve that it stands for."""
 
-LONGEST_PIECE: Final = 5e-3
-"""Pieces are joined up to this length [m], where the path is straight enough."""
+LONGEST_PIECE_M: Final = 5e-3
+"""Pieces are joined up to this length, where the path is straight enough."""
 
-FINEST: Final = 16
-"""Into so many samples, at most, a control period is divided."""
+MAX_SAMPLES_PER_PERIOD: Final = 16
+"""A control period is divided into at most this many samples."""
 
-NO_WAY: Final = 1e-9
-"""A path, or a step along it, that is shorter than this is a point [m]."""
+NEGLIGIBLE_LENGTH_M: Final = 1e-9
+"""A path, or a step along it, that is shorter than this is a point."""
 
-NEIGHBOURS: Final = 3
-"""So many of the nearest vertices are looked at to begin with."""
+FIRST_NEIGHBOUR_COUNT: Final = 3
+"""This many of the nearest vertices are searched to begin with."""
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
+class ReferencePath:
     """The path of a reference's origin from the first nominal time to the last.
 
     Attributes:
         times: nominal times of its samples, increasing, (f,) [s].
-        arcs: length of the way from the start to them, (f,) [m].
-        moving_times: nominal time spent until then on the way, without that in which the reference
-            rests or is slower than 1e-4 m/s, (f,) [s].
+        arcs: path length from the start to them, (f,) [m].
+        moving_times: nominal time until then, without that in which the reference rests or is
+            slower than 1e-4 m/s, (f,) [s].
         vertices: ends of the straight pieces, (k + 1, 3) [m].
-        vertex_arcs: length of the way to them, increasing, (k + 1,) [m].
+        vertex_arcs: path length to them, increasing, (k + 1,) [m].
         once: number of the first pieces that hold the path as a set; those of a periodic one repeat
             them.
     """
@@ -68,24 +68,25 @@ class Path:
         return lengths
 
     def distances(self, points: Array) -> Array:
-        """Distance of points (n, 3) [m] from the path as a set, (n,) [m]; exact to `CHORD`."""
+        """Compute distances of points (n, 3) [m] from the path as a set, (n,) [m], to 1e-6 m."""
         if self.is_point:
             away: Array = np.linalg.norm(points - self.vertices[0], axis=1)
             return away
         tree, half = self._tree
-        nearest, open_, count = np.full(len(points), np.inf), np.arange(len(points)), NEIGHBOURS
-        while len(open_):
+        nearest, unsettled = np.full(len(points), np.inf), np.arange(len(points))
+        count = FIRST_NEIGHBOUR_COUNT
+        while len(unsettled):
             count = min(count, tree.n)
-            there, vertices = tree.query(points[open_], count)
+            there, vertices = tree.query(points[unsettled], count)
             there, vertices = there.reshape(-1, count), vertices.reshape(-1, count)
             pieces = np.stack([np.maximum(vertices - 1, 0), np.minimum(vertices, self.once - 1)])
-            squares = [self.feet(points[open_, None], each)[1] for each in pieces]
-            nearest[open_] = np.sqrt(np.min(squares, axis=(0, 2)))
+            squares = [self.feet(points[unsettled, None], each)[1] for each in pieces]
+            nearest[unsettled] = np.sqrt(np.min(squares, axis=(0, 2)))
             if count == tree.n:
                 break
-            # A piece that was not looked at ends in vertices that are farther than these.
+            # The pieces not searched yet end in vertices that are farther away than these.
             floor = np.sqrt(np.maximum(there[:, -1] ** 2 - half**2, 0.0))
-            open_ = open_[nearest[open_] > floor + CHORD]
+            unsettled = unsettled[nearest[unsettled] > floor + CHORD_ERROR_M]
             count *= 4
         return nearest
 
@@ -96,7 +97,7 @@ class Path:
         return cKDTree(self.vertices[: self.once + 1]), float(lengths.max()) / 2
 
     def feet(self, points: Array, pieces: Indices) -> tuple[Array, Array]:
-        """The nearest point of a piece for each point: share of its length, square distance.
+        """Compute each point's nearest point of a piece: share of its length, square distance.
 
         Args:
             points: (..., 3) [m].
@@ -113,25 +114,26 @@ class Path:
         return share, np.einsum("...i,...i->...", away, away)
 
 
-def path_of(reference: Reference, end: float, dt: float) -> Path:
-    """The path of a moving reference up to a nominal time [s], sampled at dt [s] or finer.
+def reference_path(reference: Reference, end: float, dt: float) -> ReferencePath:
+    """Compute the path of a moving reference up to a nominal time [s], sampled at dt [s] or finer.
 
-    Pieces are as long as they can be: within `CHORD` of the samples, or `LONGEST_PIECE`.
+    Pieces are as long as they can be: within `CHORD_ERROR_M` of the samples, or `LONGEST_PIECE_M`.
     """
     times, points = _samples(reference, end, dt)
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     arcs = np.concatenate([[0.0], np.cumsum(steps)])
     spans = np.diff(times)
-    moving_times = np.concatenate([[0.0], np.cumsum(np.where(steps > DWELL * spans, spans, 0.0))])
+    moving = np.where(steps > DWELL_SPEED_M_S * spans, spans, 0.0)
+    moving_times = np.concatenate([[0.0], np.cumsum(moving)])
     kept = _simplified(points, steps, arcs)
     vertex_arcs = arcs[kept]
     lap = np.interp(reference.first_lap + reference.period, times, arcs)
     once = max(1, min(int(np.searchsorted(vertex_arcs, lap)), len(kept) - 1))
-    return Path(times, arcs, moving_times, points[kept], vertex_arcs, once)
+    return ReferencePath(times, arcs, moving_times, points[kept], vertex_arcs, once)
 
 
 def _samples(reference: Reference, end: float, dt: float) -> tuple[Array, Array]:
-    """Times (f,) [s] and points (f, 3) [m] whose connection is within `CHORD` of the path."""
+    """Sample times (f,) [s] and points (f, 3) [m], so that chords are within `CHORD_ERROR_M`."""
 
     def at(times: Array) -> Array:
         points = [reference.placement(tau).translation for tau in times.tolist()]
@@ -141,7 +143,7 @@ def _samples(reference: Reference, end: float, dt: float) -> tuple[Array, Array]
     points = at(times)
     bends = np.linalg.norm(np.diff(points, 2, axis=0), axis=1) / 8  # how far the chord is off
     worst = np.maximum(np.append(bends, 0.0), np.insert(bends, 0, 0.0))
-    parts = np.clip(np.ceil(np.sqrt(worst / CHORD)), 1, FINEST).astype(int)
+    parts = np.clip(np.ceil(np.sqrt(worst / CHORD_ERROR_M)), 1, MAX_SAMPLES_PER_PERIOD).astype(int)
     first = np.cumsum(parts) - parts
     share = (np.arange(parts.sum()) - np.repeat(first, parts)) / np.repeat(parts, parts)
     finer = np.append(np.repeat(times[:-1], parts) + share * (times[1] - times[0]), end)
@@ -153,8 +155,8 @@ def _samples(reference: Reference, end: float, dt: float) -> tuple[Array, Array]
 
 
 def _simplified(points: Array, steps: Array, arcs: Array) -> Indices:
-    """The samples that stay vertices: the first, the last, and those between that are needed."""
-    moved = np.concatenate([[0], np.flatnonzero(steps > NO_WAY) + 1])
+    """Choose the samples that stay vertices: the first, the last, and those needed between."""
+    moved = np.concatenate([[0], np.flatnonzero(steps > NEGLIGIBLE_LENGTH_M) + 1])
     if len(moved) == 1:
         return moved
     directions = np.diff(points[moved], axis=0)
@@ -165,7 +167,7 @@ def _simplified(points: Array, steps: Array, arcs: Array) -> Indices:
     for k in range(1, len(moved) - 1):
         turned += turns[k - 1]
         length = lengths[k + 1] - lengths[kept[-1]]
-        if length > LONGEST_PIECE or length * turned > 8 * CHORD:
+        if length > LONGEST_PIECE_M or length * turned > 8 * CHORD_ERROR_M:
             kept.append(k)
             turned = 0.0
     return moved[[*kept, len(moved) - 1]]

@@ -11,9 +11,8 @@ import pytest
 
 from dikbench import SphereObstacle
 from dikbench.arrays import Array
-from dikbench.metrics import METRICS
+from dikbench.metrics import METRICS, motion_of
 from dikbench.metrics.constraints import CONSTRAINTS
-from dikbench.metrics.motion import recompute
 from dikbench.problem.constraints import CollisionConstraint, Constraint, TorqueConstraint
 from dikbench.problem.tasks import PoseTask
 from dikbench.robots.catalogue import load_robot
@@ -51,7 +50,7 @@ def values(robot: Robot, speeds: list[float], *constraints: Constraint) -> dict[
         certificate=Certificate(()),
         constraints=constraints,
     )
-    motion = recompute(trace, scenario)
+    motion = motion_of(trace, scenario)
     return {metric.name: metric.of(motion) for metric in CONSTRAINTS}
 
 

@@ -12,14 +12,13 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from dikbench.arrays import Array
-from dikbench.metrics import evaluate
-from dikbench.metrics.motion import Motion
+from dikbench.metrics import Motion, evaluate
 from dikbench.problem.tasks import OrientationTask, PoseTask
 from dikbench.robots.catalogue import load_robot
 from dikbench.scenario import Scenario
 from dikbench.scenario.certificate import Certificate
 from dikbench.scenario.reference.curves import circle, lemniscate
-from dikbench.scenario.reference.path import Path, path_of
+from dikbench.scenario.reference.path import ReferencePath, reference_path
 from dikbench.scenario.reference.reference import Reference, target_at_rest
 from dikbench.simulation.trace import Trace
 
@@ -152,7 +151,7 @@ def test_a_frame_inside_or_outside_a_circle_has_contour_error_and_no_lag(radius:
     assert got["lag_max_s"] == pytest.approx(0.0, abs=1e-4)
 
 
-def test_off_the_path_and_late_are_told_apart_in_one_motion() -> None:
+def test_off_the_path_and_late_are_distinguished_in_one_motion() -> None:
     """0.1 s late and 3 mm to the side: both, each at its value; the quantile is the 95th."""
     got = evaluate(of(straight(), on(straight(), 0.1, np.array([0.0, 0.0, 3e-3]))))
     assert got["contour_error_max_m"] == pytest.approx(3e-3, abs=1e-9)
@@ -279,7 +278,7 @@ def test_distances_are_the_least_over_the_curve(seed: int) -> None:
         lambda tau: np.zeros(6),
     )
     for reference in (ROUND, EIGHT, polygon):
-        path = path_of(reference, reference.duration, DT)
+        path = reference_path(reference, reference.duration, DT)
         points = np.array(
             [reference.placement(tau).translation for tau in random.uniform(0, 4, 12)]
         )
@@ -294,7 +293,7 @@ def test_the_nearest_piece_may_end_farther_away_than_many_vertices() -> None:
     short = np.array([[0.0, 2.2e-3 + 1e-5 * k, 0.0] for k in range(40)])
     vertices = np.vstack([[[-2.5e-3, 0, 0], [2.5e-3, 0, 0]], short])
     arcs = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(vertices, axis=0), axis=1)))
-    path = Path(arcs, arcs, arcs, vertices, arcs, len(vertices) - 1)
+    path = ReferencePath(arcs, arcs, arcs, vertices, arcs, len(vertices) - 1)
     assert path.distances(np.array([[-5e-4, 1e-3, 0.0]])) == pytest.approx(1e-3, abs=1e-12)
 
 

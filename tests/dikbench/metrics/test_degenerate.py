@@ -13,8 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dikbench.metrics import METRICS, evaluate
-from dikbench.metrics.motion import recompute
+from dikbench.metrics import METRICS, evaluate, motion_of
 from dikbench.plugins.registry import make_scenario
 from dikbench.problem.tasks import OrientationTask, PositionTask
 from dikbench.scenario import Scenario
@@ -113,7 +112,7 @@ def test_every_trace_has_every_metric(
     """No step and few, at rest and diverging, all statuses, waiting targets: never a warning."""
     scenario = scenario_named(name)
     trace = trace_of(scenario, steps, speed, seed, waits=waits)
-    check(evaluate(recompute(trace, scenario)))
+    check(evaluate(motion_of(trace, scenario)))
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -128,10 +127,10 @@ def test_a_motion_that_is_not_finite_has_the_worst_of_everything(
     getattr(trace, part)[13, ...] = value
     if part == "tau":  # recomputing asks the reference where it is then
         motion = replace(
-            recompute(trace_of(scenario, 20, 1.0, 0, waits=False), scenario), trace=trace
+            motion_of(trace_of(scenario, 20, 1.0, 0, waits=False), scenario), trace=trace
         )
     else:
-        motion = recompute(trace, scenario)
+        motion = motion_of(trace, scenario)
     assert evaluate(motion) == {name: metric.worst for name, metric in METRICS.items()}
 
 
@@ -141,7 +140,7 @@ def test_a_run_all_of_whose_steps_ended_alike_has_shares_of_none_and_all(code: i
     scenario = scenario_named("laps")
     whole = trace_of(scenario, 10, 1.0, 0, waits=False)
     changed: dict[str, Any] = {"status": np.full(10, code), "claimed": np.zeros(10, dtype=int)}
-    got = evaluate(recompute(replace(whole, **changed), scenario))
+    got = evaluate(motion_of(replace(whole, **changed), scenario))
     answered = STEP_STATUSES[code].value in {"ok", "stuck"}
     assert got["feasible_share"] == (1.0 if answered else 0.0)
     fell_back = STEP_STATUSES[code].value in {"infeasible", "solver-failed"}
@@ -154,7 +153,7 @@ def test_a_robot_at_rest_is_smooth_and_late() -> None:
     scenario = scenario_named("laps")
     still = replace(scenario, v0=np.zeros(7))
     trace = trace_of(still, 90, 0.0, 0, waits=False)
-    got = evaluate(recompute(trace, still))
+    got = evaluate(motion_of(trace, still))
     assert got["acceleration_variation_rad_s2"] == got["reversals_per_s"] == 0.0
     assert got["energy_above_10_hz_share"] == 0.0
     assert math.isnan(got["jerk_rms_scaled"])
@@ -169,9 +168,9 @@ def test_every_array_of_a_trace_is_looked_at_by_some_metric() -> None:
     trace = trace_of(scenario, 30, 1.0, 5, waits=False)
     known = {name: np.arange(30) / 30 for name in ("primal", "dual", "gap", "distance")}
     trace = replace(trace, **known)  # type: ignore[arg-type]
-    before = evaluate(recompute(trace, scenario))
+    before = evaluate(motion_of(trace, scenario))
     for name in (field.name for field in fields(trace) if field.name != "dt"):
         changed: dict[str, Any] = {name: getattr(trace, name)[::-1] + 2}
-        got = evaluate(recompute(replace(trace, **changed), scenario))
+        got = evaluate(motion_of(replace(trace, **changed), scenario))
         same = np.array_equal([*got.values()], [*before.values()], equal_nan=True)
         assert same == (name == "commanded"), name

@@ -10,9 +10,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from dikbench.metrics import METRICS, evaluate
+from dikbench.metrics import METRICS, evaluate, motion_of
 from dikbench.metrics.constraints import CONSTRAINTS
-from dikbench.metrics.motion import recompute
 from dikbench.problem.tasks import PoseTask, PositionTask
 from dikbench.robots.catalogue import load_robot
 from dikbench.scenario import Scenario
@@ -91,7 +90,7 @@ def _four_steps() -> dict[str, float]:
         ],
         statuses=[Status.OK, Status.SOLVER_FAILED, Status.NOT_VERIFIED, Status.INFEASIBLE],
     )
-    return evaluate(recompute(trace, _scenario()))
+    return evaluate(motion_of(trace, _scenario()))
 
 
 def _chord(angle: float) -> float:
@@ -194,7 +193,7 @@ def test_a_slant_of_the_motion_is_its_largest_angle() -> None:
     """Off course by an angle between none and reversal: cosines of hand-weighted twists."""
     # Achieved (0.4, 0.5, 1), weighted (0.4, 0.5, 0.2); wanted the translation alone.
     trace = _trace([1.0, 1.0], [[0.4, 0.5, 0.0], [0.4, 0.5, 1.0]], [Status.OK, Status.OK])
-    got = evaluate(recompute(trace, _scenario()))
+    got = evaluate(motion_of(trace, _scenario()))
     assert got["off_course_max_rad"] == pytest.approx(math.acos(math.sqrt(0.41 / 0.45)))
     assert got["progress_min"] == pytest.approx(1.0)
     assert got["stuck_share"] == 0.0
@@ -204,7 +203,7 @@ def test_the_smallest_singular_value_is_that_of_the_worst_configuration() -> Non
     """Stretched, the planar arm's is zero, at the last configuration too."""
     trace = _trace([0.0], [[1.0, 0, 0]], [Status.OK])
     trace.q[-1] = 0.0
-    assert evaluate(recompute(trace, _scenario()))["sigma_min"] == pytest.approx(0.0, abs=1e-12)
+    assert evaluate(motion_of(trace, _scenario()))["sigma_min"] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_what_a_step_achieved_is_judged_where_it_began() -> None:
@@ -213,7 +212,7 @@ def test_what_a_step_achieved_is_judged_where_it_began() -> None:
     trace.applied[0] = [3.0, -5.0, 0.0]
     trace.applied[1] = [2.0, 0.0, 0.0]
     trace.q[1:, 1] = 0.0
-    motion = recompute(trace, _scenario())
+    motion = motion_of(trace, _scenario())
     assert motion.achieved[0] == pytest.approx(3.0 * J[:, 0] - 5.0 * J[:, 1])
     # Stretched: the tip is 0.9 m straight ahead of the base.
     assert motion.achieved[1] == pytest.approx([0.0, 1.8, 2.0])
@@ -224,7 +223,7 @@ def test_limits_that_are_not_in_force_are_not_violated() -> None:
     scenario = _scenario()
     bare = scenario.robot.with_limits(position=None, velocity=None, acceleration=None)
     trace = _trace([1.0, -2.0], [[0.4, 0.5, 1.0]] * 2, [Status.OK] * 2)
-    got = evaluate(recompute(trace, replace(scenario, robot=bare)))
+    got = evaluate(motion_of(trace, replace(scenario, robot=bare)))
     assert got["position_violation_max_rad"] == 0.0
     assert got["velocity_violation_max_rad_s"] == 0.0
     assert got["acceleration_violation_max_rad_s2"] == 0.0
@@ -237,7 +236,7 @@ def test_infinite_limits_are_not_violated() -> None:
     scenario = _scenario()
     far = scenario.robot.with_limits(position=np.inf, velocity=[np.inf, 1, 1], acceleration=np.inf)
     trace = _trace([1.0, -2.0], [[0.4, 0.5, 1.0]] * 2, [Status.OK] * 2)
-    got = evaluate(recompute(trace, replace(scenario, robot=far)))
+    got = evaluate(motion_of(trace, replace(scenario, robot=far)))
     assert got["violating_share"] == 0.0
     assert got["velocity_peak_ratio"] == 0.0
     assert got["acceleration_violation_max_rad_s2"] == 0.0
@@ -248,7 +247,7 @@ def test_a_one_sided_velocity_limit_is_a_ratio_on_its_side() -> None:
     scenario = _scenario()
     forward = scenario.robot.with_limits(velocity=([0, -1, -1], 2.0))
     trace = _trace([1.0], [[0.4, 0.5, 1.0]], [Status.OK])
-    got = evaluate(recompute(trace, replace(scenario, robot=forward)))
+    got = evaluate(motion_of(trace, replace(scenario, robot=forward)))
     assert got["velocity_peak_ratio"] == pytest.approx(0.5)
     assert got["velocity_violation_max_rad_s"] == 0.0
 
@@ -263,7 +262,7 @@ def test_what_a_solver_leaves_is_not_a_violation() -> None:
             acceleration=(0.5 - excess) / 0.1,  # from 0.5 to 1 rad/s in a step of 0.1 s
         )
         trace = _trace([1.0], [[0.4, 0.5, 1.0]], [Status.OK])
-        got = evaluate(recompute(trace, replace(scenario, robot=limit)))
+        got = evaluate(motion_of(trace, replace(scenario, robot=limit)))
         assert got["violating_share"] == share
         for kind in ("position", "velocity", "acceleration"):
             assert got[f"{kind}_violation_share"] == share
@@ -274,7 +273,7 @@ def test_a_start_outside_a_limit_is_not_a_step_that_violates_it() -> None:
     scenario = _scenario()
     limit = scenario.robot.with_limits(position=([0.05, -2, -2], 2.0), velocity=2.0)
     trace = _trace([1.0], [[0.4, 0.5, 1.0]], [Status.OK])
-    got = evaluate(recompute(trace, replace(scenario, robot=limit)))
+    got = evaluate(motion_of(trace, replace(scenario, robot=limit)))
     assert got["violating_share"] == got["position_violation_share"] == 0.0
     assert got["position_violation_integral_rad_s"] == 0.0
     assert got["position_violation_max_rad"] == pytest.approx(0.05)
@@ -296,13 +295,13 @@ def test_one_step_defines_every_metric_that_does_not_need_more(name: str) -> Non
     """The shortest run that there is."""
     trace = _trace([1.0], [[0.4, 0.5, 1.0]], [Status.OK])
     trace.dual[0] = 0.0
-    assert math.isnan(evaluate(recompute(trace, _scenario()))[name]) == (name in NEED_MORE)
+    assert math.isnan(evaluate(motion_of(trace, _scenario()))[name]) == (name in NEED_MORE)
 
 
 def test_no_step_leaves_what_it_cannot_define() -> None:
     """A trial that ended at step 0: errors at the start, no travel, NaN for shares and progress."""
     trace = _trace([], [], [])
-    got = evaluate(recompute(trace, _scenario()))
+    got = evaluate(motion_of(trace, _scenario()))
     assert list(got) == list(METRICS)
     for name, value in got.items():
         defined = "error" in name or name in {
@@ -317,7 +316,7 @@ def test_no_step_leaves_what_it_cannot_define() -> None:
 def test_a_run_that_only_dwells_has_no_progress() -> None:
     """Nothing was wanted at any step: NaN, and no warning about empty means."""
     trace = _trace([0.0, 0.0], [[0.0, 0.0, 0.0]] * 2, [Status.OK] * 2)
-    got = evaluate(recompute(trace, _scenario()))
+    got = evaluate(motion_of(trace, _scenario()))
     assert math.isnan(got["progress_mean"])
     assert math.isnan(got["progress_min"])
     assert math.isnan(got["off_course_max_rad"])
@@ -326,7 +325,7 @@ def test_a_run_that_only_dwells_has_no_progress() -> None:
 def test_a_run_that_stands_still_makes_no_progress() -> None:
     """Progress 0, no direction: stopped is not on course."""
     trace = _trace([0.0, 0.0], [[0.4, 0.5, 1.0]] * 2, [Status.STUCK] * 2)
-    got = evaluate(recompute(trace, _scenario()))
+    got = evaluate(motion_of(trace, _scenario()))
     assert got["progress_mean"] == 0.0
     assert math.isnan(got["off_course_max_rad"])
     assert got["stuck_share"] == 1.0
@@ -334,15 +333,37 @@ def test_a_run_that_stands_still_makes_no_progress() -> None:
 
 @pytest.mark.parametrize("name", METRICS)
 def test_metrics_say_what_they_are(name: str) -> None:
-    """A unit that is the name's end, a direction, a worst value on its side, one line."""
+    """A direction, a worst value on its side, one line."""
     metric = METRICS[name]
     assert metric.name == name
     assert "\n" not in metric.definition
-    units = {
-        "m": "_m", "rad": "_rad", "rad/s": "_rad_s", "rad/s^2": "_rad_s2", "rad s": "_rad_s",
-        "s": "_s", "1/s": "_per_s", "": "",
-    }  # fmt: skip
-    assert name.endswith(units[metric.unit])
     value = _four_steps()[name]
     sign = 1 if metric.best == "low" else -1
     assert math.isnan(value) or sign * metric.worst >= sign * value
+
+
+UNITS = {
+    "_m": {"m"}, "_rad": {"rad"}, "_rad_s": {"rad/s", "rad s"}, "_rad_s2": {"rad/s^2"},
+    "_s": {"s"}, "_per_s": {"1/s"}, "": {""},
+}  # fmt: skip
+"""What the ends of names say of units."""
+
+
+@pytest.mark.parametrize("name", METRICS)
+def test_the_unit_of_a_metric_is_that_at_the_end_of_its_name(name: str) -> None:
+    """None where the name ends without one; the longest end counts: `_rad_s`, not `_s`."""
+    end = max((suffix for suffix in UNITS if name.endswith(suffix)), key=len)
+    assert METRICS[name].unit in UNITS[end]
+
+
+@pytest.mark.parametrize("quantity", ["position", "velocity", "acceleration"])
+def test_the_unit_of_a_time_integral_is_a_second_more(quantity: str) -> None:
+    """Of `rad/s` it is `rad`."""
+    units = {
+        kind: metric.unit
+        for kind in ("max", "integral")
+        for name, metric in METRICS.items()
+        if name.startswith(f"{quantity}_violation_{kind}")
+    }
+    times_second = {"rad": "rad s", "rad/s": "rad", "rad/s^2": "rad/s"}
+    assert units["integral"] == times_second[units["max"]]

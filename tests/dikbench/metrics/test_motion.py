@@ -9,7 +9,8 @@ import pinocchio as pin
 import pytest
 
 from dikbench.arrays import Array
-from dikbench.metrics.motion import Motion, rotation_angles
+from dikbench.metrics import Motion
+from dikbench.metrics.motion_of_trace import rotation_angles
 
 # --- the smallest singular value
 

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from dikbench.arrays import Array
-from dikbench.metrics import METRICS
-from dikbench.metrics.motion import Motion
+from dikbench.metrics import METRICS, Motion
 from dikbench.metrics.sparc import sparc
 from dikbench.problem.tasks import PoseTask
 from dikbench.robots.catalogue import load_robot

@@ -11,7 +11,13 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from dikbench.arrays import Array
-from dikbench.problem.progress import DWELL, STOPPED, off_course, progress, row_weights
+from dikbench.problem.progress import (
+    DWELL_SPEED_M_S,
+    STANDSTILL_SPEED_SHARE,
+    off_course,
+    progress,
+    row_weights,
+)
 
 SPACE = row_weights((0, 1, 2, 3, 4, 5))
 EQUAL = np.ones(6)
@@ -84,11 +90,11 @@ def test_angles_near_reversal_are_not_lost(angle: float) -> None:
 
 def test_a_dwell_has_neither() -> None:
     """Where nothing is wanted there is no direction; just above the threshold there is one."""
-    for wanted in (0 * X, 0.99 * DWELL * X, 0.99 * DWELL / 0.2 * ROLL):
+    for wanted in (0 * X, 0.99 * DWELL_SPEED_M_S * X, 0.99 * DWELL_SPEED_M_S / 0.2 * ROLL):
         alpha, angle = _both(wanted, X)
         assert math.isnan(alpha)
         assert math.isnan(angle)
-    alpha, angle = _both(1.01 * DWELL * X, 1.01 * DWELL * X)
+    alpha, angle = _both(1.01 * DWELL_SPEED_M_S * X, 1.01 * DWELL_SPEED_M_S * X)
     assert (alpha, angle) == pytest.approx((1.0, 0.0))
 
 
@@ -96,8 +102,8 @@ def test_standing_still_is_stopped_and_not_on_course() -> None:
     """No angle, but a progress of zero; just above the threshold there is an angle."""
     assert _both(X, 0 * X)[0] == 0.0
     assert math.isnan(_both(X, 0 * X)[1])
-    assert math.isnan(_both(X, 0.99 * STOPPED * Y)[1])
-    assert _both(X, 1.01 * STOPPED * Y)[1] == pytest.approx(math.pi / 2)
+    assert math.isnan(_both(X, 0.99 * STANDSTILL_SPEED_SHARE * Y)[1])
+    assert _both(X, 1.01 * STANDSTILL_SPEED_SHARE * Y)[1] == pytest.approx(math.pi / 2)
 
 
 def test_each_step_stands_for_itself() -> None:

@@ -16,7 +16,7 @@ import pytest
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError, Infeasible
-from dikbench.metrics.motion import recompute
+from dikbench.metrics import motion_of
 from dikbench.plugins.registry import make_formulation, make_scenario
 from dikbench.problem import DikProblem, Formulation, Solve
 from dikbench.problem.tasks import PoseTask, PostureTask
@@ -425,7 +425,7 @@ def test_a_run_brings_its_jacobians_and_its_times() -> None:
     """One task Jacobian per step that was applied, at the configuration before it."""
     law = _Law(_at_step(7, lambda: None))
     for run in (_run(_exact), _run(law)):
-        motion = recompute(run.trace, _scenario())
+        motion = motion_of(run.trace, _scenario())
         assert run.jacobians.shape == (run.trace.steps, 3, 3)
         assert np.array_equal(run.jacobians, motion.jacobians[:-1])
         assert run.kinematics_ns > 0

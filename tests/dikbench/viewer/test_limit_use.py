@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dikbench.arrays import Array
-from dikbench.metrics import METRICS
-from dikbench.metrics.motion import recompute
+from dikbench.metrics import METRICS, motion_of
 from dikbench.plugins.registry import make_scenario
 from dikbench.robots.catalogue import load_robot
 from dikbench.simulation.trace import Trace
@@ -59,7 +58,7 @@ def test_past_agrees_with_the_metric() -> None:
     fast = nearness(trace(np.zeros((21, 3)), v), limits)
     ends = nearness(trace(q, np.zeros((20, 3))), limits)[1:]
     violating = ((fast[:-1] == PAST) | (ends == PAST)).any(axis=1)
-    share = METRICS["violating_share"].of(recompute(motion, scenario))
+    share = METRICS["violating_share"].of(motion_of(motion, scenario))
     assert 0 < share < 1
     assert violating.mean() == share
     assert (found == PAST).any()

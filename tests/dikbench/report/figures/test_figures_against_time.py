@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dikbench.metrics.motion import Motion, recompute
+from dikbench.metrics import Motion, motion_of
 from dikbench.plugins.registry import make_formulation, make_scenario
 from dikbench.report.drawing.style import style
 from dikbench.report.figures.every import draw_figures
@@ -53,10 +53,10 @@ def curves(axes: Any) -> dict[str, Any]:
     return {line.get_label(): line for line in lines if not line.get_label().startswith("_")}
 
 
-def motion_of(folder: Path, number: int) -> Motion:
-    """The stored motion of a formulation."""
+def stored_motion(folder: Path, number: int) -> Motion:
+    """The stored motion of a law."""
     trace = Trace.load(folder / "traces" / f"{number:016x}.arrow")
-    return recompute(trace, make_scenario(CROSSING))
+    return motion_of(trace, make_scenario(CROSSING))
 
 
 def test_errors_and_speeds_are_those_of_the_motion(
@@ -69,8 +69,8 @@ def test_errors_and_speeds_are_those_of_the_motion(
     errors = columns["position error [mm]"]
     speeds = columns["largest joint speed over limit"]
     assert errors.keys() == speeds.keys() == set(LAWS)
-    for number, formulation in enumerate(LAWS):
-        motion = motion_of(stored, number)
+    for number, law in enumerate(LAWS):
+        motion = stored_motion(stored, number)
         limit = motion.scenario.robot.limits.velocity
         assert limit is not None
         assert errors[formulation].get_ydata().max() == 1e3 * motion.position_error.max()
@@ -106,10 +106,10 @@ def test_margins_are_distances_to_the_nearest_limit(
         (figure,) = draw_joint_margins(ResultsFolder(stored), trials, "reach", target)
     shown = curves(drawn[0].axes)
     assert shown.keys() == set(LAWS)
-    for number, formulation in enumerate(LAWS):
-        margin = joint_margin(motion_of(stored, number))
-        assert shown[formulation].get_ydata().min() == margin.min() < 0.0
-        assert shown[formulation].get_ydata()[0] == margin[0] > 0.0
+    for number, law in enumerate(LAWS):
+        margin = joint_margin(stored_motion(stored, number))
+        assert shown[law].get_ydata().min() == margin.min() < 0.0
+        assert shown[law].get_ydata()[0] == margin[0] > 0.0
     assert (target / figure.png).is_file()
 
 
@@ -131,7 +131,7 @@ def motion_of_joints(q: list[list[float]]) -> Motion:
         0.01, np.array(q), np.zeros(n + 1), np.zeros((n, 6)), np.zeros((n, 6)), np.zeros((n, 6)),
         codes, codes, codes, codes, nothing, nothing, nothing, nothing,
     )  # fmt: skip
-    return recompute(trace, make_scenario(CROSSING))
+    return motion_of(trace, make_scenario(CROSSING))
 
 
 def test_what_cannot_be_made_again_is_left_out(
