@@ -65,15 +65,15 @@ class _Asked:
         """What the law gives, asked with a solver that remembers nothing."""
         solve = make_solve(self.solver, self.program)
         try:
-            outcome = control_step(self.formulation, problem, solve)
+            answer = control_step(self.formulation, problem, solve)
         except TrialEnded as ended:
             return _Answer(None, ended.status, str(ended), 0.0)
-        if outcome.status in {Status.INFEASIBLE, Status.SOLVER_FAILED}:
-            return _Answer(None, outcome.status, outcome.status.sentence, 0.0)
-        verdicts = solve.verdicts()
-        status = Status.NOT_VERIFIED if verdicts.lied[0] else outcome.status
-        residual = solve.calls * float(verdicts.primal[0])
-        return _Answer(outcome.velocity, status, status.sentence, residual)
+        if answer.status in {Status.INFEASIBLE, Status.SOLVER_FAILED}:
+            return _Answer(None, answer.status, answer.status.sentence, 0.0)
+        rechecked = solve.rechecked()
+        status = Status.NOT_VERIFIED if rechecked.lied[0] else answer.status
+        residual = solve.calls * float(rechecked.primal[0])
+        return _Answer(answer.velocity, status, status.sentence, residual)
 
     def verified(self) -> Iterator[tuple[State, Array, float]]:
         """Every state with an answer to judge: state, velocity, tolerance [rad/s].

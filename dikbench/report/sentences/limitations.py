@@ -11,7 +11,7 @@ import pandas as pd
 from dikbench.plugins.registry import plugins
 from dikbench.report.sentences.words import listed, number, quoted, several
 from dikbench.scenario.oracle import ORACLE
-from dikbench.scenario.plant import DRIVES, REFERENCE_MODES
+from dikbench.scenario.plant import PLANTS, REFERENCE_MODES
 from dikbench.selector import parse_selector
 from dikbench.solvers.catalogue.back_ends import BACK_ENDS, is_installed
 from dikbench.statistics.failures import SKIPPED, has_failed
@@ -235,7 +235,7 @@ def _not_run(trials: pd.DataFrame) -> list[Limitation]:
         if left_out:
             names = listed([quoted(name) for name in left_out], most=None)
             cases.append(f"{len(left_out)} of {len(known)} {what}: {names}.")
-    for column, modes in (("plant", DRIVES), ("reference", REFERENCE_MODES)):
+    for column, modes in (("plant", PLANTS), ("reference", REFERENCE_MODES)):
         used = {parse_selector(text).name for text in ran[column].unique()}
         cases += [f"The {column} `{mode}`." for mode in modes if mode not in used]
     if not trials["formulation"].eq(ORACLE).any():

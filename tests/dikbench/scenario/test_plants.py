@@ -11,7 +11,7 @@ from hypothesis.extra.numpy import arrays
 from dikbench.arrays import Array
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.limits import Limits
-from dikbench.scenario.plant import DRIVES, ideal, saturating
+from dikbench.scenario.plant import PLANTS, Ideal, Saturating
 
 
 @settings(deadline=None)
@@ -23,7 +23,7 @@ from dikbench.scenario.plant import DRIVES, ideal, saturating
 def test_the_saturating_plant_goes_no_further_out(v: Array, q: Array, dt: float) -> None:
     """Inside it ends inside, outside it goes no further out, and no joint waits for another."""
     limits = load_robot("planar3r").with_limits(position=1.0, velocity=2.0).limits.at(q)
-    applied = saturating(v, limits, dt)
+    applied = Saturating().drive(v, limits, dt)
     after = q + applied * dt
     assert np.all(np.abs(applied) <= 2.0)
     assert np.all(np.abs(after) <= np.maximum(1.0, np.abs(q)) + 1e-12)
@@ -38,5 +38,5 @@ def test_without_limits_the_saturating_plant_is_ideal() -> None:
     free = load_robot("planar3r").with_limits(position=None, velocity=None)
     limits: Limits = free.limits.at(free.q0)
     v = np.array([1e3, -1e3, 0.0])
-    assert np.array_equal(saturating(v, limits, 0.01), v)
-    assert DRIVES == {"ideal": ideal, "saturating": saturating}
+    assert np.array_equal(Saturating().drive(v, limits, 0.01), v)
+    assert PLANTS == {"ideal": Ideal, "saturating": Saturating}

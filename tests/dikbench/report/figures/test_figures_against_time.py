@@ -18,7 +18,7 @@ from dikbench.report.figures.joint_margins import draw_joint_margins, joint_marg
 from dikbench.report.figures.time_series import draw_time_series
 from dikbench.report.selection.stored_motions import in_panels, thinned
 from dikbench.results.folder import ResultsFolder
-from dikbench.scenario.plant import Plant
+from dikbench.scenario.plant import Ideal
 from dikbench.simulation.closed_loop import simulate
 from dikbench.simulation.trace import Trace
 from dikbench.solvers.checked_solve import make_solve
@@ -36,7 +36,7 @@ def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "traces").mkdir()
     scenario = make_scenario(CROSSING)
     for number, law in enumerate(LAWS):
-        run = simulate(scenario, make_formulation(law), make_solve(None, None), Plant())
+        run = simulate(scenario, make_formulation(law), make_solve(None, None), Ideal())
         run.trace.save(folder / "traces" / f"{number:016x}.arrow")
     return folder
 
