@@ -92,9 +92,12 @@ def solve_dik(
         raise DikbenchError(
             f"robot: expected a Robot (dikbench.load_robot), got {type(robot).__name__}"
         )
-    law = make_formulation(formulation) if isinstance(formulation, str) else formulation
-    if not isinstance(law, Formulation):
-        raise DikbenchError(f"formulation: expected a formulation or its selector, got {law!r}")
+    if isinstance(formulation, str):
+        formulation = make_formulation(formulation)
+    if not isinstance(formulation, Formulation):
+        raise DikbenchError(
+            f"formulation: expected a formulation or its selector, got {formulation!r}"
+        )
     _check_positive("dt", dt)
     if reference_frame not in REFERENCE_FRAMES:
         raise unknown("reference_frame", reference_frame, REFERENCE_FRAMES)
@@ -114,9 +117,9 @@ def solve_dik(
     else:
         main = _target_task(kinematics, target, 1 / dt if gain is None else gain)
     problem = pose_problem(kinematics, previous, dt, main, tasks, constraints)
-    solve = _solve_for(law, solver)
+    solve = _solve_for(formulation, solver)
     try:
-        answer = control_step(law, problem, solve)
+        answer = control_step(formulation, problem, solve)
     except TrialEnded as ended:
         raise DikbenchError(f"{ended.status.value}: {ended}") from ended
     v = answer.velocity
@@ -129,8 +132,8 @@ def solve_dik(
     return DikAnswer(v, alpha, status, problem.relaxed)
 
 
-def _solve_for(law: Formulation, selector: str | None) -> CheckedSolve:
-    program = program_of(law)
+def _solve_for(formulation: Formulation, selector: str | None) -> CheckedSolve:
+    program = program_of(formulation)
     if program is None:
         if selector is not None:
             parse_solver(selector)  # a wrong name is an error even where it is not needed

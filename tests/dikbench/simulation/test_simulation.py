@@ -212,6 +212,23 @@ def test_a_scenario_survives_its_runs() -> None:
         assert np.array_equal(a, b)
 
 
+def test_what_a_law_does_to_its_problem_reaches_neither_record_nor_plant() -> None:
+    """It may put other arrays and limits into the problem: that is its own affair."""
+    scenario = _scenario(velocity=1.0)
+    free = scenario.robot.with_limits(velocity=None, position=None).limits.at(scenario.q0)
+
+    def spoil(problem: DikProblem) -> Array:
+        v = 10 * _exact(problem)
+        problem.limits = free
+        problem.tasks[0].V, problem.tasks[0].J = np.zeros(3), np.zeros((3, 3))
+        return v
+
+    for mode in ("time", "path"):
+        spoilt = _run(spoil, scenario, plant=Saturating(), mode=mode).trace
+        _same(spoilt, _run(lambda p: 10 * _exact(p), scenario, plant=Saturating(), mode=mode).trace)
+        assert np.abs(spoilt.applied).max() == 1.0
+
+
 # --- plants
 
 
