@@ -16,3 +16,9 @@ def plain(array: Array) -> Array:
     Some libraries take no such array, others take it for a plain one.
     """
     return array if array.flags.carray else np.array(array, order="C")
+
+
+def read_only(array: Array) -> Array:
+    """Forbid writing to an array, and return it."""
+    array.flags.writeable = False
+    return array

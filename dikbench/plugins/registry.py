@@ -23,7 +23,7 @@ import msgspec
 
 from dikbench.errors import DikbenchError, unknown
 from dikbench.problem.problem import Formulation
-from dikbench.scenario.plant import DRIVES, Plant
+from dikbench.scenario.plant import PLANTS, Plant
 from dikbench.scenario.scenario import Scenario
 from dikbench.selector import Selector, parse_selector
 
@@ -187,10 +187,10 @@ def make_plant(text: str | Selector) -> Plant:
         DikbenchError: on an unknown name or parameter, or a value out of range.
     """
     selector = parse_selector(text)
-    if selector.name not in DRIVES:
-        raise unknown("plant", selector.name, DRIVES)
-    build = partial(Plant, DRIVES[selector.name])
-    plant: Plant = _build("plant", Plugin(selector.name, build, __file__), selector, {})
+    if selector.name not in PLANTS:
+        raise unknown("plant", selector.name, PLANTS)
+    plugin = Plugin(selector.name, PLANTS[selector.name], __file__)
+    plant: Plant = _build("plant", plugin, selector, {})
     return plant
 
 

@@ -27,6 +27,7 @@ from dikbench.problem.constraints import (
     TorqueConstraint,
     linearize_all,
 )
+from dikbench.problem.posing import pose_problem
 from dikbench.problem.problem import (
     DikProblem,
     Formulation,
@@ -93,6 +94,7 @@ __all__ = [
     "least_norm",
     "linearize_all",
     "null_space",
+    "pose_problem",
     "program_of",
     "promises_of",
     "pseudo_inverse",

@@ -1,8 +1,10 @@
-"""One control step as a law sees it, and what a law is."""
+"""One control step as a formulation sees it, and what a formulation is."""
 
 from __future__ import annotations
 
-from typing import Literal, Protocol, runtime_checkable
+from collections.abc import Sequence
+from operator import attrgetter
+from typing import Final, Literal, Protocol, runtime_checkable
 
 import msgspec
 
@@ -16,45 +18,55 @@ from dikbench.robots.robot import Robot
 
 LimitKind = Literal["position", "velocity", "acceleration", "inequalities"]
 
+_PRIORITY: Final = attrgetter("priority")
+
 
 class DikProblem(msgspec.Struct, eq=False):
     """One control step: where the robot is, what is wanted of it, what it may do.
 
+    The tasks may be given in any order: they are sorted by priority when the problem is made, and
+    those of one priority keep the order in which they were given.
+
     Attributes:
-        robot: the robot; `robot.scratch` is free for a law's own kinematics.
+        robot: the robot; `robot.scratch` is free for a formulation's own kinematics.
         q: configuration, (nq,).
         v_prev: the velocity that the plant applied last, (nv,); None: no acceleration bound.
         dt: control period [s].
-        tasks: the linearised tasks J v = V, most important first.
+        tasks: the linearised tasks J v = V, most important first, as a tuple.
         limits: the limits in force, as seen from q.
         relaxed: joints whose acceleration bound `box` had to give up (a record, see `box`).
         G, h: what else must hold, G v <= h, (p, nv) and (p,); None where nothing else must (see
             `dikbench.problem.constraints`).
+        levels: one task per priority, most important first, equal priorities stacked. Computed from
+            the tasks when the problem is made, never given.
     """
 
     robot: Robot
     q: Array
     v_prev: Array | None
     dt: float
-    tasks: list[LinearizedTask]
+    tasks: Sequence[LinearizedTask]
     limits: Limits
     relaxed: int = 0
     G: Array | None = None
     h: Array | None = None
+    levels: Sequence[LinearizedTask] = ()
+
+    def __post_init__(self) -> None:
+        """Sort the tasks and stack those of one priority."""
+        self.tasks = tuple(sorted(self.tasks, key=_PRIORITY))
+        levels: list[list[LinearizedTask]] = []
+        for task in self.tasks:
+            if levels and levels[-1][0].priority == task.priority:
+                levels[-1].append(task)
+            else:
+                levels.append([task])
+        self.levels = tuple([stacked(level) for level in levels])
 
     @property
     def primary(self) -> LinearizedTask:
         """The most important task (several of the same priority stacked into one)."""
-        first = self.tasks[0]
-        if len(self.tasks) == 1 or self.tasks[1].priority != first.priority:
-            return first
-        return stacked([task for task in self.tasks if task.priority == first.priority])
-
-    @property
-    def levels(self) -> list[LinearizedTask]:
-        """One task per priority, most important first, equal priorities stacked."""
-        priorities = sorted({task.priority for task in self.tasks})
-        return [stacked([t for t in self.tasks if t.priority == p]) for p in priorities]
+        return self.levels[0]
 
     def box(self, braking: Braking = "viable", position_gain: float = 0.5) -> Box:
         """The velocity box (see `velocity_box`); how many bounds it gave up is recorded here."""
@@ -64,7 +76,7 @@ class DikProblem(msgspec.Struct, eq=False):
 
 
 class Solve(Protocol):
-    """A solver, injected into a law: timed, counted, its answers rechecked."""
+    """A solver, handed to a formulation: timed, counted, its answers rechecked."""
 
     def __call__(self, program: QuadraticProgram | ModelledProgram) -> Array:
         """Solve a program and return x.
@@ -80,9 +92,9 @@ class Solve(Protocol):
 class Formulation(Protocol):
     """A law of differential inverse kinematics: a frozen dataclass whose fields are parameters.
 
-    Besides `velocity` it may declare, as class attributes or properties, `program` (what it needs
-    a solver for; default: none) and `keeps` (the limits it promises to keep; default: none); a
-    paragraph `Source: ...` in its docstring names the paper. The same problem gives the same
+    In addition to `velocity` it may declare, as class attributes or properties, `program` (what it
+    needs a solver for; default: none) and `keeps` (the limits it promises to keep; default: none);
+    a paragraph `Source: ...` in its docstring names the paper. The same problem gives the same
     velocity.
     """
 
@@ -96,11 +108,11 @@ class Formulation(Protocol):
 
 
 def program_of(formulation: Formulation) -> Program | None:
-    """What the law needs a solver for; None for a law that needs none."""
+    """What the formulation needs a solver for; None where it needs none."""
     program: Program | None = getattr(formulation, "program", None)
     return program
 
 
 def promises_of(formulation: Formulation) -> frozenset[LimitKind]:
-    """The kinds of limits that the law promises to keep."""
+    """The kinds of limits that the formulation promises to keep."""
     return frozenset(getattr(formulation, "keeps", ()))

@@ -131,7 +131,7 @@ class _Interior:
     """Where no position limit bounds the velocity: between `above` and `below`, coordinates (nv,).
 
     There the box is the velocity limits (and acceleration limits about v_prev), which saves a fast
-    law most of its time.
+    formulation most of its time.
     """
 
     __slots__ = ("above", "below", "box", "fastest", "slowest")

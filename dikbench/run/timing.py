@@ -1,4 +1,4 @@
-"""The timing pass: recorded problems replayed to every law and solver, on one core, one thread."""
+"""The timing pass: recorded problems given to every formulation and solver, on one core."""
 
 from __future__ import annotations
 
@@ -15,46 +15,47 @@ import numpy as np
 
 from dikbench.arrays import Array
 from dikbench.plugins.registry import make_formulation
-from dikbench.problem.constraints import linearize_all
+from dikbench.problem.posing import pose_problem
 from dikbench.problem.problem import DikProblem, Formulation, Solve
 from dikbench.results.columns import RATES
 from dikbench.robots.kinematics import Kinematics
 from dikbench.run.trial_row import TrialRow, scenario_of, solve_of
-from dikbench.scenario.plant import Plant
+from dikbench.scenario.plant import Ideal
 from dikbench.scenario.scenario import Scenario
 from dikbench.selector import Selector
 from dikbench.simulation.closed_loop import simulate
 from dikbench.simulation.control_step import TrialEnded, control_step
 from dikbench.solvers.checked_solve import CheckedSolve, make_solve
-from dikbench.statistics.stability import verdict
+from dikbench.statistics.stability import stability_of
 
 LEAD_IN: Final = 5
 """Problems that are replayed before each timed segment: they bring back what another cell drove out
 of the caches, and a warm start to where the segment begins."""
 
 Cell = tuple[Selector, Selector]
-"""The selectors of a law and its solver."""
+"""The selectors of a formulation and its solver."""
 
-PARTS: Final = ("law", "own", "core", "wrapper")
-"""The whole call of the law; of it the law's own, the solver library's and its wrapper's share."""
+PARTS: Final = ("whole", "own", "core", "wrapper")
+"""The whole call of the formulation, and of it the share of its own code, of the solver library and
+of the library's wrapper."""
 
 
 @dataclass(frozen=True)
 class _Recording:
-    """A law that keeps the problems it is given."""
+    """A formulation that keeps the problems that another one is given."""
 
-    law: Formulation
+    formulation: Formulation
     problems: list[DikProblem]
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         self.problems.append(problem)
-        return self.law.velocity(problem, solve)
+        return self.formulation.velocity(problem, solve)
 
 
-def record_problems(scenario: Scenario, law: Formulation, count: int) -> list[DikProblem]:
-    """The problems of a contiguous segment from the middle of a run of a law without solver."""
-    recording = _Recording(law, [])
-    simulate(scenario, recording, make_solve(None, None), Plant())
+def record_problems(scenario: Scenario, formulation: Formulation, count: int) -> list[DikProblem]:
+    """Record contiguous problems from the middle of a run of a formulation without solver."""
+    recording = _Recording(formulation, [])
+    simulate(scenario, recording, make_solve(None, None), Ideal())
     problems = recording.problems
     first = max(0, (len(problems) - count) // 2)
     return problems[first : first + count]
@@ -66,13 +67,13 @@ def time_scenario(
     """Time every cell on one scenario's problems.
 
     In every round each cell solves the whole segment, in a new random order of the cells, so that
-    drift of the machine hits all alike. A sample is one call of the law with its solver.
+    drift of the machine hits all alike. A sample is one call of the formulation with its solver.
 
     Args:
         selector: the scenario.
         seed: its seed.
-        cells: laws and solvers.
-        reference: the law that drives the recorded run.
+        cells: formulations and solvers.
+        reference: the formulation that drives the recorded run.
         problems: number of problems.
         rounds: how often each cell solves all of them.
 
@@ -81,7 +82,9 @@ def time_scenario(
     """
     scenario = scenario_of(selector, seed)
     segment = record_problems(scenario, make_formulation(reference), problems)
-    laws = [(make_formulation(law), solve_of(law, solver, checks=False)) for law, solver in cells]
+    timed = [
+        (make_formulation(name), solve_of(name, solver, checks=False)) for name, solver in cells
+    ]
     samples = np.full((len(cells), len(PARTS), rounds, len(segment)), np.nan)
     kinematics = np.full((rounds, len(segment)), np.nan)
     order = list(range(-1, len(cells)))  # -1: the kinematics, which all cells share
@@ -94,15 +97,15 @@ def time_scenario(
                     found = _time_kinematics(scenario, segment)
                     kinematics[max(turn, 0)] = found
                 else:
-                    samples[index, :, max(turn, 0)] = _replay(*laws[index], segment)
+                    samples[index, :, max(turn, 0)] = _time_formulation(*timed[index], segment)
     return [
         {
-            "formulation": str(law),
+            "formulation": str(formulation),
             "solver": str(solver),
             "scenario": str(selector),
             **_summary(samples[index], kinematics),
         }
-        for index, (law, solver) in enumerate(cells)
+        for index, (formulation, solver) in enumerate(cells)
     ]
 
 
@@ -122,16 +125,18 @@ def undisturbed() -> Iterator[None]:
             os.sched_setaffinity(0, cores)
 
 
-def _replay(law: Formulation, solve: CheckedSolve, segment: Sequence[DikProblem]) -> Array:
-    """Time the law on each problem, (parts, problems) [ns]; NaN from where it breaks on."""
+def _time_formulation(
+    formulation: Formulation, solve: CheckedSolve, segment: Sequence[DikProblem]
+) -> Array:
+    """Time a formulation on each problem, (parts, problems) [ns]; NaN from where it breaks on."""
     times = np.full((len(PARTS), len(segment)), np.nan)
     found = []
     try:
         for problem in segment[:LEAD_IN]:
-            control_step(law, problem, solve)
+            control_step(formulation, problem, solve)
         for problem in segment:
-            outcome = control_step(law, problem, solve)
-            found.append((outcome.law_ns, solve.solve_ns, solve.core_ns))
+            answer = control_step(formulation, problem, solve)
+            found.append((answer.formulation_ns, solve.solve_ns, solve.core_ns))
     except TrialEnded:
         pass
     if found:
@@ -141,27 +146,23 @@ def _replay(law: Formulation, solve: CheckedSolve, segment: Sequence[DikProblem]
 
 
 def _time_kinematics(scenario: Scenario, segment: Sequence[DikProblem]) -> Array:
-    """Time of setting each problem up again, (problems,) [ns], as `simulate` does it."""
-    robot, tracking = scenario.robot, scenario.tracking
-    kinematics = Kinematics(robot)
+    """Time how each problem is posed, (problems,) [ns], as `simulate` does it."""
+    kinematics, tracking = Kinematics(scenario.robot), scenario.tracking
     found = []
     for number, given in enumerate(segment):
         target, twist = scenario.targets[number % len(scenario.targets)]
         start = perf_counter_ns()
         kinematics.update(given.q)
-        tasks = [tracking.linearize(kinematics, target, twist)]
-        for secondary in scenario.tasks:
-            tasks.append(secondary.linearize(kinematics))
-        DikProblem(robot, given.q, given.v_prev, given.dt, tasks, robot.limits.at(given.q))
-        linearize_all(scenario.constraints, kinematics, given.v_prev, given.dt)
+        task = tracking.linearize(kinematics, target, twist)
+        pose_problem(kinematics, given.v_prev, given.dt, task, scenario.tasks, scenario.constraints)
         found.append(perf_counter_ns() - start)
     return np.array(found, dtype=float)
 
 
 def _summary(samples: Array, kinematics: Array) -> TrialRow:
-    """What is reported of one cell: samples (parts, rounds, problems), kinematics, all [ns]."""
-    law = samples[PARTS.index("law")]
-    timed = law[~np.isnan(law)] / 1e3
+    """Summarise one cell: samples (parts, rounds, problems) and kinematics, all [ns]."""
+    calls = samples[PARTS.index("whole")]
+    timed = calls[~np.isnan(calls)] / 1e3
     if not len(timed):
         return {}
     own, core, wrapper = (
@@ -181,5 +182,5 @@ def _summary(samples: Array, kinematics: Array) -> TrialRow:
             f"missed_{rate}_hz_share": float(np.mean(timed + shared > 1e6 / rate)) for rate in RATES
         },
         "timing_samples": len(timed),
-        "timing_stability": verdict(law),
+        "timing_stability": stability_of(calls),
     }

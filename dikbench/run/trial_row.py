@@ -18,8 +18,9 @@ from dikbench.run.worker_process import calm_down
 from dikbench.scenario.oracle import ORACLE
 from dikbench.scenario.scenario import Scenario
 from dikbench.selector import Selector
-from dikbench.simulation.closed_loop import ReferenceMode, simulate
-from dikbench.simulation.oracle_law import replay_of
+from dikbench.simulation.clock import ReferenceMode
+from dikbench.simulation.closed_loop import simulate
+from dikbench.simulation.oracle_formulation import OracleFormulation
 from dikbench.simulation.status import Status
 from dikbench.solvers.catalogue.back_ends import parse_solver
 from dikbench.solvers.checked_solve import CheckedSolve, make_solve
@@ -124,7 +125,7 @@ def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "al
     start = perf_counter()
     run = simulate(
         scenario,
-        replay_of(scenario) if oracle else make_formulation(trial.formulation),
+        OracleFormulation.of(scenario) if oracle else make_formulation(trial.formulation),
         make_solve(None, None) if oracle else solve_of(trial.formulation, trial.solver),
         plant,
         mode,
@@ -145,7 +146,7 @@ def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "al
         "steps": run.trace.steps,
         **metrics,
         "wall_time_s": perf_counter() - start,
-        "control_time_s": (run.kinematics_ns + run.law_ns) / 1e9,
+        "control_time_s": (run.kinematics_ns + run.formulation_ns) / 1e9,
     }
 
 

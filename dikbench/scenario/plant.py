@@ -1,57 +1,40 @@
-"""Plants: what a robot makes of a commanded velocity, and what a law gets to see of it."""
+"""Plants: what a robot makes of a commanded velocity, and what a formulation sees of it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
 import numpy as np
+import pinocchio as pin
 
-from dikbench.arrays import Array
+from dikbench.arrays import Array, read_only
 from dikbench.errors import DikbenchError
 from dikbench.robots.limits import Limits
-
-Drive = Callable[[Array, Limits, float], Array]
-"""(commanded v (nv,), limits at q, dt [s]) -> applied v (nv,)."""
+from dikbench.scenario.scenario import Scenario
 
 LONGEST_DELAY: Final = 1000
-"""Control steps; beyond that there is no loop to close."""
+"""Control steps; with a longer delay there is no loop to close."""
 
-
-def ideal(v: Array, limits: Limits, dt: float) -> Array:
-    """Integrates whatever is commanded, limits or not: shows violations."""
-    return v
-
-
-def saturating(v: Array, limits: Limits, dt: float) -> Array:
-    """A drive that clips each joint to its velocity and position limits: shows going off course."""
-    velocity = limits.joint.velocity
-    if velocity is not None:
-        v = np.clip(v, velocity.lower, velocity.upper)
-    if limits.to_lower is not None and limits.to_upper is not None:
-        # A joint that is outside already may not go further out, and is not thrown back.
-        v = np.clip(v, -np.maximum(limits.to_lower, 0) / dt, np.maximum(limits.to_upper, 0) / dt)
-    return v
-
-
-DRIVES: Final[Mapping[str, Drive]] = MappingProxyType({"ideal": ideal, "saturating": saturating})
+NOISE_STREAM: Final = 3
+"""Separates the noise from what the same seed draws of the scenario."""
 
 
 @dataclass(frozen=True)
-class Plant:
+class Plant(ABC):
     """A drive behind a measurement and a line of communication.
 
     Attributes:
-        drive: what becomes of a command that arrives.
-        noise: standard deviation of the configuration that the law sees about the true one, per
-            joint and step [rad or m]; white and normal, drawn from the trial's seed.
+        noise: standard deviation of the configuration that the formulation sees about the true
+            one, per joint and step [rad or m]; white and normal, drawn from the trial's seed.
         delay: control steps by which a command arrives late; until the first one does, the robot
             keeps the velocity that it has at the start.
     """
 
-    drive: Drive = ideal
     noise: float = 0.0
     delay: int = 0
 
@@ -61,6 +44,79 @@ class Plant:
             raise DikbenchError(f"plant: noise={self.noise} must be finite and at least 0 [rad]")
         if not 0 <= self.delay <= LONGEST_DELAY:
             raise DikbenchError(f"plant: delay={self.delay} must be 0 to {LONGEST_DELAY} steps")
+
+    @abstractmethod
+    def drive(self, v: Array, limits: Limits, dt: float) -> Array:
+        """Compute what is applied of a command that arrived.
+
+        Args:
+            v: the command, (nv,) [rad/s or m/s]; not to be written to.
+            limits: the limits in force, as seen from the true configuration.
+            dt: control period [s].
+        """
+
+    def start(self, scenario: Scenario, seed: int) -> StartedPlant:
+        """Start a trial of a scenario, with a seed for the noise."""
+        return StartedPlant(self, scenario, seed)
+
+
+class StartedPlant:
+    """A plant in one trial: its random numbers and the commands that are under way."""
+
+    __slots__ = ("_arriving", "_dt", "_model", "_plant", "_random")
+
+    def __init__(self, plant: Plant, scenario: Scenario, seed: int) -> None:
+        self._plant, self._model, self._dt = plant, scenario.robot.model, scenario.dt
+        self._random = np.random.default_rng([seed, NOISE_STREAM])
+        self._arriving = deque([read_only(scenario.v0.copy())] * plant.delay)
+
+    def seen(self, q: Array) -> Array:
+        """Measure the true configuration, (nq,); without noise the result is `q` itself."""
+        if not self._plant.noise:
+            return q
+        error = self._random.normal(0.0, self._plant.noise, self._model.nv)
+        return read_only(pin.integrate(self._model, q, error))
+
+    def apply(self, v: Array, limits: Limits) -> Array:
+        """Send a command and apply the one that arrives in this control step.
+
+        Args:
+            v: the command, (nv,) [rad/s or m/s], read-only.
+            limits: the limits in force, as seen from the true configuration.
+
+        Returns:
+            The velocity (nv,) with which the robot moves during this step, read-only.
+        """
+        self._arriving.append(v)
+        return read_only(self._plant.drive(self._arriving.popleft(), limits, self._dt))
+
+
+class Ideal(Plant):
+    """Applies whatever is commanded, limits or not: shows violations."""
+
+    def drive(self, v: Array, limits: Limits, dt: float) -> Array:
+        """Return the command (see `Plant.drive`)."""
+        return v
+
+
+class Saturating(Plant):
+    """Clips each joint to its velocity and position limits: shows going off course."""
+
+    def drive(self, v: Array, limits: Limits, dt: float) -> Array:
+        """Clip the command (see `Plant.drive`)."""
+        velocity = limits.joint.velocity
+        if velocity is not None:
+            v = np.clip(v, velocity.lower, velocity.upper)
+        if limits.to_lower is not None and limits.to_upper is not None:
+            # A joint that is outside already may not go further out, and is not thrown back.
+            lower, upper = np.maximum(limits.to_lower, 0), np.maximum(limits.to_upper, 0)
+            v = np.clip(v, -lower / dt, upper / dt)
+        return v
+
+
+PLANTS: Final[Mapping[str, type[Plant]]] = MappingProxyType(
+    {"ideal": Ideal, "saturating": Saturating}
+)
 
 
 REFERENCE_MODES: Final = MappingProxyType(

@@ -1,4 +1,4 @@
-"""One control step: ask the law, and stand by a fallback where it has no answer."""
+"""One control step: ask the formulation, and fall back on slowing down where it has no answer."""
 
 from __future__ import annotations
 
@@ -19,59 +19,59 @@ OK = Status.OK  # an attribute of an enumeration costs as much as a small produc
 
 
 class TrialEnded(Exception):
-    """A law did what ends a trial; carries the status and the message."""
+    """A formulation did what ends a trial; carries the status and the message."""
 
     def __init__(self, status: Status, message: str) -> None:
         super().__init__(message)
         self.status = status
 
 
-class Outcome(msgspec.Struct, eq=False):
-    """What came of one control step.
+class StepAnswer(msgspec.Struct, eq=False):
+    """The answer to one control step.
 
     Attributes:
-        velocity: the law's velocity or the fallback's, (nv,) [rad/s].
+        velocity: the formulation's velocity or the fallback's, (nv,) [rad/s].
         status: `ok`, `infeasible` or `solver-failed` (whether an answer is verified is known after
             the recheck, `stuck` is judged by the motion).
-        law_ns: time in the law, its solver included, rechecking excluded [ns].
+        formulation_ns: time in the formulation, its solver included, rechecking excluded [ns].
         square: v^T v.
     """
 
     velocity: Array
     status: Status
-    law_ns: int
+    formulation_ns: int
     square: float
 
 
 def control_step(
     formulation: Formulation, problem: DikProblem, solve: CheckedSolve, step: int = 0
-) -> Outcome:
-    """Ask the law for the velocity of this step (its number in the run).
+) -> StepAnswer:
+    """Ask the formulation for the velocity of this step (its number in the run).
 
     Raises:
-        TrialEnded: if the law raises anything but `CannotAnswer`, or returns what is not a finite
-            vector (nv,) of real numbers.
+        TrialEnded: if the formulation raises anything but `CannotAnswer`, or returns what is not a
+            finite vector (nv,) of real numbers.
     """
     solve.begin_step(step)
     start = perf_counter_ns()
     try:
         v = formulation.velocity(problem, solve)
     except CannotAnswer as error:
-        law_ns = perf_counter_ns() - start - solve.checking_ns
+        formulation_ns = perf_counter_ns() - start - solve.checking_ns
         status = Status.INFEASIBLE if isinstance(error, Infeasible) else Status.SOLVER_FAILED
         v = fallback(problem)
-        return Outcome(v, status, law_ns, float(v.dot(v)))
+        return StepAnswer(v, status, formulation_ns, float(v.dot(v)))
     except MemoryError as error:
         raise TrialEnded(Status.OUT_OF_MEMORY, f"{type(error).__name__}: {error}") from error
     except Exception as error:
         message = str(error).strip().partition("\n")[0]
         raise TrialEnded(Status.FORMULATION_ERROR, f"{type(error).__name__}: {message}") from error
-    law_ns = perf_counter_ns() - start - solve.checking_ns
-    return Outcome(v, OK, law_ns, _square(v, problem.robot.nv))
+    formulation_ns = perf_counter_ns() - start - solve.checking_ns
+    return StepAnswer(v, OK, formulation_ns, _square(v, problem.robot.nv))
 
 
 def _square(v: object, nv: int) -> float:
-    """v^T v of what a law returned, which is checked first."""
+    """Check what a formulation returned, and compute v^T v of it."""
     if type(v) is not np.ndarray or v.shape != (nv,) or v.dtype is not FLOATS:
         _check_velocity(v, nv)
     square: float = v.dot(v)  # type: ignore[attr-defined]
@@ -97,7 +97,9 @@ def fallback(problem: DikProblem) -> Array:
     without either, or without v_prev, the robot stops at once (outside a position limit the box
     then asks for the way back).
     """
-    box = velocity_box(problem.limits, problem.v_prev, problem.dt)  # not recorded as the law's
+    box = velocity_box(
+        problem.limits, problem.v_prev, problem.dt
+    )  # not recorded as the formulation's
     v = np.zeros(problem.robot.nv)
     if problem.v_prev is not None:
         v = _slowest(problem, problem.v_prev) * problem.v_prev

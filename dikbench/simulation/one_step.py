@@ -13,8 +13,9 @@ import pinocchio as pin
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError, unknown
 from dikbench.plugins.registry import make_formulation
-from dikbench.problem.constraints import Constraint, linearize_all
-from dikbench.problem.problem import DikProblem, Formulation, program_of
+from dikbench.problem.constraints import Constraint
+from dikbench.problem.posing import pose_problem
+from dikbench.problem.problem import Formulation, program_of
 from dikbench.problem.progress import STUCK_PROGRESS, progress, row_weights
 from dikbench.problem.tasks import LinearizedTask, PoseTask, Task
 from dikbench.robots.kinematics import Kinematics
@@ -33,9 +34,11 @@ class DikAnswer:
     """The answer to one control step.
 
     Attributes:
-        velocity: joint velocity, (nv,) [rad/s or m/s]; the fallback's where the law had none.
+        velocity: joint velocity, (nv,) [rad/s or m/s]; the fallback's where the formulation
+            had none.
         progress: share of the wanted motion that it makes, <J v, V>/|V|^2 with angular rows
-            weighted by L = 0.2 m (the alpha of laws that scale); NaN where nothing is wanted.
+            weighted by L = 0.2 m (the alpha of formulations that scale); NaN where no motion is
+            desired.
         status: how the step ended.
         relaxed: number of joints whose acceleration bound had to be given up.
     """
@@ -63,35 +66,38 @@ def solve_dik(
 ) -> DikAnswer:
     """Compute the joint velocity of one control step.
 
-    Where q is outside a position limit, laws that keep the limits ask for the way back, at most at
-    a tenth of the velocity limit, or answer by the fallback that does (status `infeasible`).
+    Where q is outside a position limit, formulations that keep the limits move back inside, at most
+    at a tenth of the velocity limit, or the fallback does so (status `infeasible`).
 
     Args:
         robot: the robot, with the limits that are in force.
         q: configuration, (nq,).
-        formulation: a law or its selector, such as `dls[damping=0.1]`.
+        formulation: a formulation or its selector, such as `dls[damping=0.1]`.
         twist: wanted twist of the task frame, (linear; angular), (6,) [m/s; rad/s].
         target: wanted placement of the task frame (`pinocchio.SE3`); give this or a twist.
         reference_frame: the axes in which the twist is given, Pinocchio's names.
         gain: of the target, 1/s; default 1/dt (there in one step).
         dt: control period [s].
         solver: a solver's selector, such as `osqp[eps_abs=1e-6]`; default: daqp, or clarabel for a
-            law written in cvxpy. Not used by laws that need none.
+            formulation written in cvxpy. Not used by formulations that need none.
         v_prev: velocity applied in the step before, (nv,); None means no acceleration bound.
         tasks: secondary tasks.
-        constraints: what must hold beside the limits of the joints.
+        constraints: what must hold in addition to the limits of the joints.
 
     Raises:
-        DikbenchError: on a wrong name, shape or value, or a law that raises, or answers with a
-            wrong shape or NaN.
+        DikbenchError: on a wrong name, shape or value, or a formulation that raises, or answers
+            with a wrong shape or NaN.
     """
     if not isinstance(robot, Robot):
         raise DikbenchError(
             f"robot: expected a Robot (dikbench.load_robot), got {type(robot).__name__}"
         )
-    law = make_formulation(formulation) if isinstance(formulation, str) else formulation
-    if not isinstance(law, Formulation):
-        raise DikbenchError(f"formulation: expected a law or its selector, got {law!r}")
+    if isinstance(formulation, str):
+        formulation = make_formulation(formulation)
+    if not isinstance(formulation, Formulation):
+        raise DikbenchError(
+            f"formulation: expected a formulation or its selector, got {formulation!r}"
+        )
     _check_positive("dt", dt)
     if reference_frame not in REFERENCE_FRAMES:
         raise unknown("reference_frame", reference_frame, REFERENCE_FRAMES)
@@ -110,32 +116,24 @@ def solve_dik(
         main = _twist_task(kinematics, twist, reference_frame)
     else:
         main = _target_task(kinematics, target, 1 / dt if gain is None else gain)
-    problem = DikProblem(
-        robot,
-        configuration,
-        previous,
-        dt,
-        sorted([main, *(task.linearize(kinematics) for task in tasks)], key=lambda t: t.priority),
-        robot.limits.at(configuration),
-    )
-    problem.G, problem.h = linearize_all(constraints, kinematics, previous, dt)
-    solve = _solve_for(law, solver)
+    problem = pose_problem(kinematics, previous, dt, main, tasks, constraints)
+    solve = _solve_for(formulation, solver)
     try:
-        outcome = control_step(law, problem, solve)
+        answer = control_step(formulation, problem, solve)
     except TrialEnded as ended:
         raise DikbenchError(f"{ended.status.value}: {ended}") from ended
-    v = outcome.velocity
+    v = answer.velocity
     alpha = float(progress(main.V[None], (main.J @ v)[None], row_weights(robot.task_rows))[0])
-    status, verdicts = outcome.status, solve.verdicts()
-    if status is Status.OK and verdicts.lied[0]:
+    status = answer.status
+    if status is Status.OK and solve.rechecked().lied[0]:
         status = Status.NOT_VERIFIED
     if status is Status.OK and alpha < STUCK_PROGRESS:
         status = Status.STUCK
     return DikAnswer(v, alpha, status, problem.relaxed)
 
 
-def _solve_for(law: Formulation, selector: str | None) -> CheckedSolve:
-    program = program_of(law)
+def _solve_for(formulation: Formulation, selector: str | None) -> CheckedSolve:
+    program = program_of(formulation)
     if program is None:
         if selector is not None:
             parse_solver(selector)  # a wrong name is an error even where it is not needed
@@ -160,7 +158,7 @@ def _check_tasks(tasks: object) -> None:
 
 
 def _twist_task(kinematics: Kinematics, twist: object, reference_frame: str) -> LinearizedTask:
-    """The task J v = V for a twist that is given in the axes of a reference frame."""
+    """Make the task J v = V of a twist that is given in the axes of a reference frame."""
     robot = kinematics.robot
     V = checked_vector(twist, 6, "twist")
     X = kinematics.placement(robot.frame_id)

@@ -23,12 +23,12 @@ class Trace:
         q: configurations, (n + 1, nq): before each step, and after the last.
         tau: nominal time on the reference at each of them, (n + 1,) [s].
         wanted: desired twist V of the tracking task, (n, m) [m/s; rad/s], in the task frame.
-        commanded: the law's velocity (or the fallback's), (n, nv) [rad/s].
+        commanded: the formulation's velocity (or the fallback's), (n, nv) [rad/s].
         applied: what the plant made of it, (n, nv) [rad/s].
         status: codes of `STEP_STATUSES`, (n,).
         relaxed: joints whose acceleration bound was given up, (n,).
         claimed, verified: what the solver said of the step's programs and what the recheck says, 1
-            or 0; -1 where nothing was solved, (n,) each (see `Verdicts`).
+            or 0; -1 where nothing was solved, (n,) each (see `RecheckedSteps`).
         primal, dual, gap: largest residuals of the step's programs, (n,) (see `Residuals`).
         distance: their largest distance from the optimum, (n,) [rad/s].
     """

@@ -16,7 +16,7 @@ from dikbench.programs.quadratic_program import Program, QuadraticProgram
 from dikbench.solvers.catalogue.back_ends import Solver
 from dikbench.solvers.catalogue.presets import TOLERANCES
 from dikbench.solvers.recheck.feasibility import is_feasible
-from dikbench.solvers.recheck.rechecked import Solved, Verdicts
+from dikbench.solvers.recheck.rechecked import RecheckedSteps, Solved
 
 BATCH: Final = 512
 """Answers that wait for their recheck: many, since they are rechecked at once; not the whole run,
@@ -39,10 +39,10 @@ class CheckedSolve:
     __slots__ = (
         "_back_end",
         "_checks",
+        "_rechecked",
         "_solved",
         "_step",
         "_tolerance",
-        "_verdicts",
         "calls",
         "checking_ns",
         "core_ns",
@@ -56,14 +56,14 @@ class CheckedSolve:
         self._tolerance = tolerance
         self._checks = checks
         self._solved: list[Solved] = []
-        self._verdicts = Verdicts(0)
+        self._rechecked = RecheckedSteps(0)
         self.begin_run(1)
         self.begin_step(0)
 
     def begin_run(self, steps: int) -> None:
-        """Forget everything, and make room for the verdicts on so many control steps."""
+        """Forget everything, and make room for so many control steps."""
         self._solved.clear()
-        self._verdicts = Verdicts(steps)
+        self._rechecked = RecheckedSteps(steps)
 
     def begin_step(self, step: int) -> None:
         """Forget the records of the step before; its programs are kept for the recheck."""
@@ -73,15 +73,15 @@ class CheckedSolve:
         self.core_ns = 0
         self.checking_ns = 0
         if len(self._solved) >= BATCH:
-            self._judge()
+            self._recheck()
 
-    def verdicts(self) -> Verdicts:
-        """What the recheck says of the run so far."""
-        self._judge()
-        return self._verdicts
+    def rechecked(self) -> RecheckedSteps:
+        """Recheck the answers that wait for it, and return what was found in the run so far."""
+        self._recheck()
+        return self._rechecked
 
-    def _judge(self) -> None:
-        self._verdicts.judge(self._solved, self._tolerance)
+    def _recheck(self) -> None:
+        self._rechecked.recheck(self._solved, self._tolerance)
         self._solved.clear()
 
     def __call__(self, program: QuadraticProgram | ModelledProgram) -> Array:

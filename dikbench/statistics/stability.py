@@ -21,7 +21,7 @@ SPREAD: Final = 0.5
 """How far apart the quartiles of all samples may lie, as a share of the median."""
 
 
-def verdict(samples: Array) -> str:
+def stability_of(samples: Array) -> str:
     """Judge the timings of one cell.
 
     Single slow samples are no fault of a measurement (they are what the quantiles report), and of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os.path
-from dataclasses import fields, is_dataclass
+from dataclasses import astuple, fields, is_dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -34,8 +34,8 @@ def trial_id(trial: Trial) -> str:
         DikbenchError: if a selector does not name anything valid.
     """
     cell = timing_id(trial.formulation, trial.solver, trial.scenario)
-    plant = make_plant(trial.plant)
-    how = (plant.drive.__name__, plant.noise, plant.delay, trial.reference, trial.seed)
+    plant = (trial.plant.name, *astuple(make_plant(trial.plant)))
+    how = (*plant, trial.reference, trial.seed)
     return digest(json.dumps((cell, *how)))
 
 

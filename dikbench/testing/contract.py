@@ -37,9 +37,10 @@ Check = Callable[[Formulation, str | None], None]
 
 
 class _Answer(NamedTuple):
-    """What a law gave: a velocity, or None and what it did instead; the solver's residual.
+    """What a formulation gave: a velocity, or None and what it did instead; the solver's residual.
 
-    Of a law that solves several programs, each from what the last one gave, the residuals add up.
+    A formulation may solve several programs, each from what the last one gave: their residuals add
+    up.
     """
 
     velocity: Array | None
@@ -49,7 +50,7 @@ class _Answer(NamedTuple):
 
 
 class _Asked:
-    """A law and the solver it is checked with."""
+    """A formulation and the solver with which it is checked."""
 
     def __init__(self, formulation: Formulation, solver: str | None) -> None:
         self.formulation = formulation
@@ -62,23 +63,24 @@ class _Asked:
                 raise DikbenchError(reason)
 
     def answer(self, problem: DikProblem) -> _Answer:
-        """What the law gives, asked with a solver that remembers nothing."""
+        """Ask the formulation, with a solver that remembers nothing."""
         solve = make_solve(self.solver, self.program)
         try:
-            outcome = control_step(self.formulation, problem, solve)
+            answer = control_step(self.formulation, problem, solve)
         except TrialEnded as ended:
             return _Answer(None, ended.status, str(ended), 0.0)
-        if outcome.status in {Status.INFEASIBLE, Status.SOLVER_FAILED}:
-            return _Answer(None, outcome.status, outcome.status.sentence, 0.0)
-        verdicts = solve.verdicts()
-        status = Status.NOT_VERIFIED if verdicts.lied[0] else outcome.status
-        residual = solve.calls * float(verdicts.primal[0])
-        return _Answer(outcome.velocity, status, status.sentence, residual)
+        if answer.status in {Status.INFEASIBLE, Status.SOLVER_FAILED}:
+            return _Answer(None, answer.status, answer.status.sentence, 0.0)
+        rechecked = solve.rechecked()
+        status = Status.NOT_VERIFIED if rechecked.lied[0] else answer.status
+        residual = solve.calls * float(rechecked.primal[0])
+        return _Answer(answer.velocity, status, status.sentence, residual)
 
     def verified(self) -> Iterator[tuple[State, Array, float]]:
-        """Every state with an answer to judge: state, velocity, tolerance [rad/s].
+        """Yield every state with a verified answer: state, velocity, tolerance [rad/s].
 
-        A law may have no answer at some states, and a solver may be wrong at some; not at all.
+        A formulation may have no answer at some states, and a solver may be wrong at some, but not
+        at all of them.
         """
         answered = False
         why = ""
@@ -94,7 +96,7 @@ class _Asked:
 
 
 def check_declaration(formulation: Formulation, solver: str | None = None) -> None:
-    """The law is a frozen dataclass and declares only programs and limits that there are."""
+    """Check that the formulation is a frozen dataclass and that what it declares exists."""
     name = type(formulation).__name__
     parameters = getattr(formulation, "__dataclass_params__", None)
     if isinstance(formulation, type) or not is_dataclass(formulation) or not parameters.frozen:
@@ -109,7 +111,7 @@ def check_declaration(formulation: Formulation, solver: str | None = None) -> No
 
 
 def check_raises_only_cannot_answer(formulation: Formulation, solver: str | None = None) -> None:
-    """The law answers or raises `CannotAnswer`, and answers somewhere."""
+    """Check that the formulation answers or raises `CannotAnswer`, and answers somewhere."""
     asked = _Asked(formulation, solver)
     for state in states():
         answer = asked.answer(state.problem)
@@ -120,7 +122,7 @@ def check_raises_only_cannot_answer(formulation: Formulation, solver: str | None
 
 
 def check_shape(formulation: Formulation, solver: str | None = None) -> None:
-    """The velocity is an array of nv floats."""
+    """Check that the velocity is an array of nv floats."""
     asked = _Asked(formulation, solver)
     for state in states():
         answer = asked.answer(state.problem)
@@ -131,7 +133,7 @@ def check_shape(formulation: Formulation, solver: str | None = None) -> None:
 
 
 def check_finite(formulation: Formulation, solver: str | None = None) -> None:
-    """The velocity holds neither NaN nor infinity."""
+    """Check that the velocity holds neither NaN nor infinity."""
     asked = _Asked(formulation, solver)
     for state in states():
         answer = asked.answer(state.problem)
@@ -140,7 +142,7 @@ def check_finite(formulation: Formulation, solver: str | None = None) -> None:
 
 
 def check_inputs_untouched(formulation: Formulation, solver: str | None = None) -> None:
-    """The law leaves everything that it was handed as it was."""
+    """Check that the formulation leaves everything that it was handed as it was."""
     asked = _Asked(formulation, solver)
     for state in states():
         before = {name: np.array(value) for name, value in _inputs(state.problem).items()}
@@ -154,7 +156,7 @@ def check_inputs_untouched(formulation: Formulation, solver: str | None = None) 
 
 
 def _inputs(problem: DikProblem) -> dict[str, Array | float]:
-    """The numbers that a law is handed, by the name under which it finds them."""
+    """List the numbers that a formulation is handed, by the name under which it finds them."""
     found: dict[str, Array | float | None] = {
         "q": problem.q,
         "v_prev": problem.v_prev,
@@ -177,12 +179,12 @@ def _inputs(problem: DikProblem) -> dict[str, Array | float]:
 
 
 def check_repeatable(formulation: Formulation, solver: str | None = None) -> None:
-    """The same problem gives the same velocity, bit for bit, whatever was asked in between."""
+    """Check that the same problem gives the same velocity to the bit, whatever came in between."""
     _compare(_Asked(formulation, solver), _Asked(formulation, solver), "asked again")
 
 
 def check_picklable(formulation: Formulation, solver: str | None = None) -> None:
-    """The law survives pickling, and the copy gives the same velocities, bit for bit."""
+    """Check that the formulation can be pickled, and that the copy gives the same velocities."""
     try:
         unpickled = pickle.loads(pickle.dumps(formulation))
     except Exception as error:
@@ -206,22 +208,22 @@ def _compare(first: _Asked, second: _Asked, what: str) -> None:
 
 
 def check_position_limits(formulation: Formulation, solver: str | None = None) -> None:
-    """Where promised: q + v dt is inside the position limits, and no joint outside goes further."""
+    """Check, where promised, that q + v dt is inside the position limits, or no further out."""
     _check_promise("position", formulation, solver)
 
 
 def check_velocity_limits(formulation: Formulation, solver: str | None = None) -> None:
-    """Where promised: v is inside the velocity limits."""
+    """Check, where promised, that v is inside the velocity limits."""
     _check_promise("velocity", formulation, solver)
 
 
 def check_acceleration_limits(formulation: Formulation, solver: str | None = None) -> None:
-    """Where promised, in force and not relaxed: (v - v_prev)/dt is inside the limits."""
+    """Check, where promised and not relaxed, that (v - v_prev)/dt is inside the limits."""
     _check_promise("acceleration", formulation, solver)
 
 
 def check_inequalities(formulation: Formulation, solver: str | None = None) -> None:
-    """Where promised: G v <= h, at states where the law has an answer."""
+    """Check, where promised, that G v <= h at states where the formulation has an answer."""
     _check_promise("inequalities", formulation, solver)
 
 
@@ -232,7 +234,7 @@ def _check_promise(kind: LimitKind, formulation: Formulation, solver: str | None
 
 
 def _allowed(problem: DikProblem, kind: LimitKind) -> tuple[Array, Array] | None:
-    """The velocities that a kind of limit allows, (nv,) each; None where it is not in force."""
+    """Compute what a kind of limit allows, two arrays (nv,); None where it is not in force."""
     limits, dt = problem.limits, problem.dt
     if kind == "position":
         if limits.to_lower is None or limits.to_upper is None:
@@ -278,12 +280,13 @@ def _assert_inequalities(state: State, v: Array, tolerance: float) -> None:
 
 
 def check_state(formulation: Formulation, state: State, solver: str | None = None) -> None:
-    """At one state of your own making: a velocity inside the promised limits, or `CannotAnswer`.
+    """Check one state of your own: a velocity inside the promised limits, or `CannotAnswer`.
 
     For property-based tests; the answer of a solver that is wrong there is not judged.
 
     Raises:
-        AssertionError: if the law raises, answers with a wrong shape or NaN, or breaks a promise.
+        AssertionError: if the formulation raises, answers with a wrong shape or NaN, or breaks a
+            promise.
     """
     answer = _Asked(formulation, solver).answer(state.problem)
     if answer.status in {Status.FORMULATION_ERROR, Status.WRONG_SHAPE, Status.NOT_FINITE}:
@@ -310,15 +313,15 @@ CHECKS: Final[tuple[Check, ...]] = (
 
 
 def check_formulation(formulation: Formulation, solver: str | None = None) -> None:
-    """Run every check on a law.
+    """Run every check on a formulation.
 
     Args:
-        formulation: the law, with its parameters set.
-        solver: a solver's selector; default: the one that a law of this program gets by default.
+        formulation: the formulation, with its parameters set.
+        solver: a solver's selector; default: the default one for its program.
 
     Raises:
-        AssertionError: if the law breaks its contract.
-        DikbenchError: if the solver is unknown or cannot take what the law needs solved.
+        AssertionError: if the formulation breaks its contract.
+        DikbenchError: if the solver is unknown or cannot take what the formulation needs solved.
     """
     for check in CHECKS:
         check(formulation, solver)

@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.arrays import Array
+from dikbench.problem.posing import pose_problem
 from dikbench.problem.problem import DikProblem
 from dikbench.problem.tasks import PoseTask, PostureTask
 from dikbench.problem.velocity_box import velocity_box
@@ -41,7 +42,7 @@ SINGULAR: Final[Mapping[str, tuple[tuple[float, ...], ...]]] = MappingProxyType(
         "planar3r": ((0.4, 0, 0), (0.4, 0, 0.7)),
     }
 )
-"""Exactly singular configurations of the robots on which laws are checked."""
+"""Exactly singular configurations of the robots on which formulations are checked."""
 
 
 class State(NamedTuple):
@@ -52,7 +53,7 @@ class State(NamedTuple):
 
 
 def states() -> Iterator[State]:
-    """Every state, built afresh: a law that spoils its inputs spoils one state.
+    """Make every state, each of new arrays: a formulation that spoils its inputs spoils one.
 
     Places (inside, about a limit, singular) are crossed with three speeds; acceleration limits, the
     motion before, a posture task and rows G v <= h come in turns.
@@ -138,10 +139,9 @@ def _rows(problem: DikProblem, random: np.random.Generator) -> tuple[Array, Arra
 def _problem(robot: Robot, q: Array, twist: Array, *, posture: bool) -> DikProblem:
     """The control step in which the frame is to move with a twist towards a target."""
     kinematics = Kinematics(robot)
-    kinematics.update(q)
+    kinematics.update(q.copy())
     # Less than half a turn away, so that the logarithm gives the twist back.
     target = kinematics.placement(robot.frame_id) * pin.exp6(twist * DT)
-    tasks = [PoseTask(target=target, gain=1 / DT).linearize(kinematics)]
-    if posture:
-        tasks.append(PostureTask(robot.q0, weight=0.01).linearize(kinematics))
-    return DikProblem(robot, q.copy(), None, DT, tasks, robot.limits.at(q))
+    pose = PoseTask(target=target, gain=1 / DT).linearize(kinematics)
+    others = [PostureTask(robot.q0, weight=0.01)] if posture else []
+    return pose_problem(kinematics, None, DT, pose, others)

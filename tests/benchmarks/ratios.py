@@ -38,7 +38,7 @@ from dikbench.run.timing import record_problems
 from dikbench.run.trial_row import run_trial
 from dikbench.scenario import Scenario
 from dikbench.scenario.building import start_velocity
-from dikbench.scenario.plant import Plant
+from dikbench.scenario.plant import Ideal
 from dikbench.scenario.reference.curves import circle
 from dikbench.simulation.closed_loop import simulate
 from dikbench.solvers.catalogue.back_ends import parse_solver
@@ -74,7 +74,7 @@ def our_tick(scenario: Scenario, law: str, solver: str | None) -> Tick:
 
     def run() -> int:
         solve = make_solve(parse_solver(solver) if solver else None, program, checks=False)
-        return simulate(scenario, formulation, solve, Plant()).trace.steps
+        return simulate(scenario, formulation, solve, Ideal()).trace.steps
 
     return run
 

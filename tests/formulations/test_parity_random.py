@@ -69,7 +69,7 @@ def drake_bounds(robot: Robot, q: Array, before: Array) -> tuple[Array, Array]:
     return lower, upper
 
 
-def verdict(
+def stability_of(
     robot: Robot, gain: float, q: Array, before: Array, V: Array, theirs: Array, ours: DikAnswer
 ) -> str:
     """What an answer of Drake's is worth beside ours, and by how much."""
@@ -133,7 +133,7 @@ def test_drakes_function(name: str, gain: int, acceleration: bool) -> None:
             robot, q, formulation=law, twist=V, dt=DT, reference_frame="LOCAL", solver=EXACT,
             v_prev=before, tasks=posture,
         )  # fmt: skip
-        found = verdict(robot, gain, q, before, V, theirs, ours)
+        found = stability_of(robot, gain, q, before, V, theirs, ours)
         if found == "unsolved":
             assert ours.status is not Status.OK or ours.progress < 0.01 + 1e-6
         verdicts[found] += 1

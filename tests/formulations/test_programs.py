@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import msgspec
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -119,12 +120,12 @@ def test_the_weighted_program_tends_to_the_hierarchy() -> None:
 def test_three_levels_are_answered_where_bounds_bind() -> None:
     """Position, orientation and posture of a fast hand, a level hardly damped in between."""
     answered = 0
-    for problem in _problems(60, 1.5):
-        hand, posture = problem.tasks
+    for drawn in _problems(60, 1.5):
+        hand, posture = drawn.tasks
         position = LinearizedTask(hand.J[:3], hand.V[:3], np.zeros(3))
         orientation = LinearizedTask(hand.J[3:], hand.V[3:], np.zeros(3), priority=2)
         posture.priority = 3
-        problem.tasks[:] = [position, orientation, posture]
+        problem = msgspec.structs.replace(drawn, tasks=[posture, orientation, position])
         try:
             v = _velocity("hqp", problem)
         except SolverFailed:
@@ -204,13 +205,13 @@ def test_components_of_an_orientation_are_roll_pitch_and_yaw() -> None:
     """Each rate of the frame is a share of the wanted one, and they add up to the most there is."""
     random = np.random.default_rng(8)
     held_back = 0
-    for problem in _problems(20, 0.0, "none"):
-        kinematics = Kinematics(problem.robot)
-        kinematics.update(problem.q)
-        R = kinematics.placement(problem.robot.frame_id).rotation
+    for drawn in _problems(20, 0.0, "none"):
+        kinematics = Kinematics(drawn.robot)
+        kinematics.update(drawn.q)
+        R = kinematics.placement(drawn.robot.frame_id).rotation
         target = R @ pin.exp3(random.uniform(-1, 1, 3))
         task = OrientationTask(target=target, gain=20.0).linearize(kinematics)
-        problem.tasks[:] = [task]
+        problem = msgspec.structs.replace(drawn, tasks=[task])
         v = _velocity("lp-alpha-components[regularization=0]", problem)
         E = twist_from_rates(R)[3:, 3:]
         alphas = np.linalg.solve(E, task.J @ v) / np.linalg.solve(E, task.V)

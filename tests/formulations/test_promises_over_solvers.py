@@ -75,7 +75,7 @@ def kept_promises(formulation: Formulation, solver: Solver, stride: int) -> int:
             solve, robot = make_solve(solver, program), problem.robot.name
         solve.begin_run(1)
         state = State(label, msgspec.structs.replace(problem, relaxed=0))
-        outcome, verdicts = control_step(formulation, state.problem, solve), solve.verdicts()
+        outcome, verdicts = control_step(formulation, state.problem, solve), solve.rechecked()
         if outcome.status is not Status.OK or verdicts.lied[0]:
             continue
         answered += 1

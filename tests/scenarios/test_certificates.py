@@ -20,7 +20,7 @@ from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.robot import Robot
 from dikbench.scenario import Scenario
 from dikbench.scenario.certificate import Certificate, Claim
-from dikbench.scenario.plant import Plant
+from dikbench.scenario.plant import Ideal
 from dikbench.simulation.closed_loop import simulate
 from dikbench.solvers.checked_solve import make_solve
 from formulations.pseudo_inverse import PseudoInverse
@@ -215,7 +215,7 @@ def test_seed_zero_of_a_limit_crossing_has_the_tables_posture(robot: str) -> Non
 def test_the_speed_sweep_peaks_at_its_speed(speed: float) -> None:
     """Following it exactly, a law without limits moves at that share of the velocity limits."""
     scenario = make_scenario(f"speed-sweep[speed={speed},dt=0.002,laps=1]")
-    run = simulate(scenario, PseudoInverse(), make_solve(None, None), Plant())
+    run = simulate(scenario, PseudoInverse(), make_solve(None, None), Ideal())
     velocity = scenario.robot.limits.velocity
     assert velocity is not None
     assert velocity.usage(run.trace.applied).max() == pytest.approx(speed, rel=0.05)

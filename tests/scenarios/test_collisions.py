@@ -19,7 +19,7 @@ from dikbench.problem import program_of
 from dikbench.problem.constraints import CollisionConstraint
 from dikbench.robots.kinematics import Kinematics
 from dikbench.scenario import Scenario
-from dikbench.scenario.plant import Plant
+from dikbench.scenario.plant import Ideal
 from dikbench.simulation.closed_loop import Run, simulate
 from dikbench.simulation.status import STEP_CODE, Status
 from dikbench.solvers.catalogue.back_ends import parse_solver
@@ -43,7 +43,7 @@ def _run(law: str, scenario: Scenario, solver: str = "daqp") -> Run:
     formulation = make_formulation(law)
     program = program_of(formulation)
     solve = make_solve(None if program is None else parse_solver(solver), program)
-    run = simulate(scenario, formulation, solve, Plant())
+    run = simulate(scenario, formulation, solve, Ideal())
     assert run.status is Status.OK
     return run
 

@@ -12,7 +12,7 @@ from dikbench.metrics import Motion, motion_of
 from dikbench.plugins.registry import make_formulation, make_scenario
 from dikbench.problem import program_of
 from dikbench.problem.progress import off_course, progress
-from dikbench.scenario.plant import Plant
+from dikbench.scenario.plant import Ideal
 from dikbench.simulation.closed_loop import simulate
 from dikbench.simulation.status import Status
 from dikbench.solvers.catalogue.back_ends import parse_solver
@@ -31,7 +31,7 @@ def _motion(law: str, scenario: str) -> Motion:
     formulation, case = make_formulation(law), make_scenario(scenario)
     program = program_of(formulation)
     solve = make_solve(None if program is None else parse_solver("daqp"), program)
-    run = simulate(case, formulation, solve, Plant())
+    run = simulate(case, formulation, solve, Ideal())
     assert run.status is Status.OK
     return motion_of(run.trace, case)
 

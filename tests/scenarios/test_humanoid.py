@@ -18,7 +18,7 @@ from dikbench.problem import program_of
 from dikbench.problem.tasks import PoseTask
 from dikbench.robots.catalogue import load_robot
 from dikbench.scenario import Scenario
-from dikbench.scenario.plant import Plant
+from dikbench.scenario.plant import Ideal
 from dikbench.simulation.closed_loop import simulate
 from dikbench.simulation.status import Status
 from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, parse_solver
@@ -39,7 +39,7 @@ def run(law: str, scenario: Scenario) -> Array:
     formulation = make_formulation(law)
     program = program_of(formulation)
     solve = make_solve(None if program is None else parse_solver("daqp"), program)
-    done = simulate(scenario, formulation, solve, Plant())
+    done = simulate(scenario, formulation, solve, Ideal())
     assert done.status is Status.OK
     assert done.trace.share(Status.OK) == 1
     return done.trace.q
@@ -131,7 +131,7 @@ def test_every_law_runs_on_a_free_base(law: str) -> None:
     program = program_of(formulation)
     solver = None if program is None else parse_solver(DEFAULT_SOLVER[program])
     scenario = replace(whole, duration=5 * whole.dt)
-    done = simulate(scenario, formulation, make_solve(solver, program), Plant())
+    done = simulate(scenario, formulation, make_solve(solver, program), Ideal())
     assert (done.status, done.message) == (Status.OK, "")
     # It takes poses and positions alone.
     infeasible = 1.0 if law == "lp-alpha-components" else 0.0

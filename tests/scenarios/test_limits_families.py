@@ -16,7 +16,7 @@ from dikbench.plugins.registry import make_plant, make_scenario
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
 from dikbench.simulation.closed_loop import simulate
-from dikbench.simulation.oracle_law import replay_of
+from dikbench.simulation.oracle_formulation import OracleFormulation
 from dikbench.solvers.checked_solve import make_solve
 from scenarios.joint_limit_crossing import CROSSINGS, Crossing
 from scenarios.start_outside import JOINTS
@@ -208,7 +208,9 @@ def test_the_shortest_way_leads_through_the_limit() -> None:
 def test_the_way_round_keeps_every_limit() -> None:
     """The oracle, acceleration limits in force: 5 rad, nothing violated, no error at the end."""
     scenario = make_scenario("greedy-trap[acceleration=true]")
-    run = simulate(scenario, replay_of(scenario), make_solve(None, None), make_plant("ideal"))
+    run = simulate(
+        scenario, OracleFormulation.of(scenario), make_solve(None, None), make_plant("ideal")
+    )
     found = evaluate(motion_of(run.trace, scenario))
     assert found["joint_travel_rad"] == pytest.approx(5.0, abs=1e-3)
     assert found["orientation_error_final_rad"] < 1e-3

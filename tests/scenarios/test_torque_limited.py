@@ -15,7 +15,7 @@ from dikbench.problem import program_of
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.robot import Robot
 from dikbench.scenario import Scenario
-from dikbench.scenario.plant import Plant
+from dikbench.scenario.plant import Ideal
 from dikbench.simulation.closed_loop import simulate
 from dikbench.simulation.status import STEP_CODE, Status
 from dikbench.simulation.trace import Trace
@@ -29,7 +29,7 @@ def run(law: str, scenario: Scenario) -> Trace:
     formulation = make_formulation(law)
     program = program_of(formulation)
     solve = make_solve(None if program is None else parse_solver("daqp"), program)
-    done = simulate(scenario, formulation, solve, Plant())
+    done = simulate(scenario, formulation, solve, Ideal())
     assert done.status is Status.OK
     return done.trace
 

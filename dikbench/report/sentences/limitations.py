@@ -11,7 +11,7 @@ import pandas as pd
 from dikbench.plugins.registry import plugins
 from dikbench.report.sentences.words import listed, number, quoted, several
 from dikbench.scenario.oracle import ORACLE
-from dikbench.scenario.plant import DRIVES, REFERENCE_MODES
+from dikbench.scenario.plant import PLANTS, REFERENCE_MODES
 from dikbench.solvers.catalogue.back_ends import BACK_ENDS, is_installed
 from dikbench.statistics.failures import SKIPPED, has_failed
 from dikbench.statistics.stability import STABLE
@@ -234,7 +234,7 @@ def _not_run(trials: pd.DataFrame) -> list[Limitation]:
         if left_out:
             names = listed([quoted(name) for name in left_out], most=None)
             cases.append(f"{len(left_out)} of {len(known)} {what}: {names}.")
-    for column, modes in (("plant_name", DRIVES), ("reference", REFERENCE_MODES)):
+    for column, modes in (("plant_name", PLANTS), ("reference", REFERENCE_MODES)):
         used, what = set(ran[column]), column.removesuffix("_name")
         cases += [f"The {what} `{mode}`." for mode in modes if mode not in used]
     if not trials["formulation"].eq(ORACLE).any():

@@ -27,7 +27,7 @@ Solved = tuple[int, QuadraticProgram | ModelledProgram, Answer]
 _Answered = tuple[int, QuadraticProgram, Answer]
 
 
-class Verdicts:
+class RecheckedSteps:
     """What the recheck found at each of n control steps, (n,) each.
 
     Attributes:
@@ -52,11 +52,11 @@ class Verdicts:
         self.gap: Array = np.zeros(steps)
         self.distance: Array = np.zeros(steps)
 
-    def judge(self, solved: Sequence[Solved], tolerance: float) -> None:
+    def recheck(self, solved: Sequence[Solved], tolerance: float) -> None:
         """Recheck answers and record what is found at their steps.
 
         Args:
-            solved: what was solved, at steps of which none was judged before.
+            solved: what was solved, at steps of which none was rechecked before.
             tolerance: largest residual of a verified answer.
         """
         if not solved:
@@ -74,9 +74,9 @@ class Verdicts:
             program = given.matrices() if isinstance(given, ModelledProgram) else given
             groups.setdefault(structure(program, answer), []).append((step, program, answer))
         for group in groups.values():
-            self._judge(group, tolerance)
+            self._recheck_group(group, tolerance)
 
-    def _judge(self, group: list[_Answered], tolerance: float) -> None:
+    def _recheck_group(self, group: list[_Answered], tolerance: float) -> None:
         steps, programs, answers = (list(column) for column in zip(*group, strict=True))
         stack = Stack(programs, answers)
         with np.errstate(invalid="ignore", over="ignore"):  # an answer may be anything

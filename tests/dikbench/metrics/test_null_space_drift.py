@@ -13,7 +13,7 @@ from dikbench.arrays import Array
 from dikbench.metrics import METRICS, Motion, motion_of
 from dikbench.plugins.registry import make_formulation, make_scenario
 from dikbench.scenario import Scenario
-from dikbench.scenario.plant import Plant
+from dikbench.scenario.plant import Ideal
 from dikbench.scenario.reference.curves import circle
 from dikbench.simulation.closed_loop import simulate
 from dikbench.simulation.trace import Trace
@@ -95,7 +95,7 @@ def test_what_scenarios_call_a_period_is_one(selector: str) -> None:
 
 def test_under_the_pseudo_inverse_the_hand_comes_back_and_the_joints_do_not() -> None:
     """The finding of Klein & Huang (1983), on the Panda; far more than the hand is off."""
-    run = simulate(SWEEP, make_formulation("pinv"), make_solve(None, None), Plant())
+    run = simulate(SWEEP, make_formulation("pinv"), make_solve(None, None), Ideal())
     motion = motion_of(run.trace, SWEEP, run.jacobians)
     found = METRICS["null_space_drift_per_lap_rad"].of(motion)
     turned = pin.difference(SWEEP.robot.model, motion.trace.q[0], motion.trace.q[-1])

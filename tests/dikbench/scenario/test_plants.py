@@ -1,17 +1,36 @@
-"""Plants alone: what they make of one command."""
+"""Plants alone: what they make of commands, and what is seen of the robot."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from typing import Any
+
 import numpy as np
+import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from dikbench.arrays import Array
+from dikbench.arrays import Array, read_only
+from dikbench.plugins.registry import make_scenario
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.limits import Limits
-from dikbench.scenario.plant import DRIVES, ideal, saturating
+from dikbench.scenario import Scenario
+from dikbench.scenario.plant import PLANTS, Ideal, Plant, Saturating
+
+REACH = make_scenario("reach")
+"""A Panda, whose v0 is made different from 0 here."""
+
+
+def _scenario(**limits: Any) -> Scenario:
+    robot = REACH.robot.with_limits(**limits)
+    return replace(REACH, robot=robot, v0=np.linspace(-0.3, 0.3, robot.nv))
+
+
+def _commands(count: int, size: float = 1.0) -> list[Array]:
+    random = np.random.default_rng(5)
+    return [read_only(size * random.normal(size=REACH.robot.nv)) for _ in range(count)]
 
 
 @settings(deadline=None)
@@ -23,7 +42,7 @@ from dikbench.scenario.plant import DRIVES, ideal, saturating
 def test_the_saturating_plant_goes_no_further_out(v: Array, q: Array, dt: float) -> None:
     """Inside it ends inside, outside it goes no further out, and no joint waits for another."""
     limits = load_robot("planar3r").with_limits(position=1.0, velocity=2.0).limits.at(q)
-    applied = saturating(v, limits, dt)
+    applied = Saturating().drive(v, limits, dt)
     after = q + applied * dt
     assert np.all(np.abs(applied) <= 2.0)
     assert np.all(np.abs(after) <= np.maximum(1.0, np.abs(q)) + 1e-12)
@@ -38,5 +57,104 @@ def test_without_limits_the_saturating_plant_is_ideal() -> None:
     free = load_robot("planar3r").with_limits(position=None, velocity=None)
     limits: Limits = free.limits.at(free.q0)
     v = np.array([1e3, -1e3, 0.0])
-    assert np.array_equal(saturating(v, limits, 0.01), v)
-    assert DRIVES == {"ideal": ideal, "saturating": saturating}
+    assert np.array_equal(Saturating().drive(v, limits, 0.01), v)
+    assert PLANTS == {"ideal": Ideal, "saturating": Saturating}
+
+
+@pytest.mark.parametrize("kind", PLANTS.values())
+@pytest.mark.parametrize("delay", [0, 1, 5])
+def test_a_command_is_applied_as_many_steps_late_as_the_delay(
+    kind: type[Plant], delay: int
+) -> None:
+    """At step n that of step n - delay, before that the velocity at the start; read-only."""
+    scenario = _scenario(position=None, velocity=None)
+    started = kind(delay=delay).start(scenario, 0)
+    limits = scenario.robot.limits.at(scenario.q0)
+    commands = _commands(12)
+    applied = [started.apply(v, limits) for v in commands]
+    expected = [*[scenario.v0] * delay, *commands][:12]
+    assert np.array_equal(applied, expected)
+    assert not any(v.flags.writeable for v in applied)
+    assert scenario.v0.flags.writeable  # the scenario is not touched
+
+
+def test_trials_of_one_plant_share_nothing() -> None:
+    """Neither the commands under way nor the random numbers."""
+    plant, scenario = Ideal(noise=1e-3, delay=1), _scenario()
+    limits = scenario.robot.limits.at(scenario.q0)
+    first, second = plant.start(scenario, 1), plant.start(scenario, 1)
+    first.apply(_commands(1)[0], limits)
+    seen = [first.seen(scenario.q0) for _ in range(3)]
+    assert np.array_equal(second.apply(_commands(1)[0], limits), scenario.v0)
+    assert np.array_equal([second.seen(scenario.q0) for _ in range(3)], seen)
+    assert not np.array_equal(plant.start(scenario, 2).seen(scenario.q0), seen[0])
+
+
+@pytest.mark.parametrize(("noise", "delay"), [(0.0, 0), (1e-2, 0), (1e-2, 3)])
+def test_a_saturating_plant_never_leaves_the_limits(noise: float, delay: int) -> None:
+    """Whatever is commanded, seen or late: q inside the position limits, v inside the others."""
+    scenario = _scenario(velocity=1.5)
+    robot, q = scenario.robot, scenario.q0
+    position = robot.limits.position
+    assert position is not None
+    started, at_limit = Saturating(noise, delay).start(scenario, 0), False
+    for k, v in enumerate(_commands(2000, 20.0)):
+        started.seen(q)
+        push = v + (20.0 if k % 1000 < 500 else -20.0)
+        applied = started.apply(push, robot.limits.at(q))
+        assert np.abs(applied).max() <= 1.5
+        q = pin.integrate(robot.model, q, applied * scenario.dt)
+        assert np.all((position.lower - 1e-12 <= q) & (q <= position.upper + 1e-12))
+        at_limit |= bool(np.any(np.abs(q - position.upper) < 1e-12))
+    assert at_limit
+
+
+@pytest.mark.parametrize("kind", PLANTS.values())
+def test_noise_is_on_what_is_seen_alone(kind: type[Plant]) -> None:
+    """The same velocities are applied to the bit; without noise q itself is seen."""
+    scenario = _scenario()
+    limits = scenario.robot.limits.at(scenario.q0)
+    plain, noisy = kind().start(scenario, 0), kind(noise=0.1).start(scenario, 0)
+    q = scenario.q0.copy()
+    for v in _commands(20, 3.0):
+        assert plain.seen(q) is q
+        seen = noisy.seen(q)
+        assert np.abs(seen - q).max() > 1e-3
+        assert not seen.flags.writeable
+        assert np.array_equal(plain.apply(v, limits), noisy.apply(v, limits))
+    assert np.array_equal(q, scenario.q0)
+
+
+def test_noise_is_white_and_as_large_as_it_says() -> None:
+    """Per joint, in the tangent space: a free base is seen with a quaternion of unit length."""
+    scenario = make_scenario("humanoid")
+    model, q = scenario.robot.model, scenario.q0
+    started = Ideal(noise=1e-3).start(scenario, 4)
+    seen = [started.seen(q) for _ in range(400)]
+    errors = np.array([pin.difference(model, q, each) for each in seen])
+    assert errors.std(axis=0) == pytest.approx(np.full(model.nv, 1e-3), rel=0.2)
+    assert np.abs(errors.mean(axis=0)).max() < 3e-4
+    assert abs(np.mean(errors[1:] * errors[:-1])) < 2e-8
+    assert np.linalg.norm([each[3:7] for each in seen], axis=1) == pytest.approx(1.0)
+
+
+@dataclass(frozen=True)
+class Weak(Plant):
+    """A drive that makes a share of what is commanded: a plant of somebody else."""
+
+    share: float = 0.5
+
+    def drive(self, v: Array, limits: Limits, dt: float) -> Array:
+        """See `Plant`."""
+        return self.share * v
+
+
+def test_a_plant_needs_nothing_but_its_drive() -> None:
+    """Measurement and delay are there; a parameter of its own stands after them."""
+    scenario = _scenario()
+    started = Weak(delay=1, share=0.25).start(scenario, 0)
+    limits, (a, b) = scenario.robot.limits.at(scenario.q0), _commands(2)
+    assert np.array_equal(started.apply(a, limits), 0.25 * scenario.v0)
+    assert np.array_equal(started.apply(b, limits), 0.25 * a)
+    with pytest.raises(TypeError):
+        Plant()  # type: ignore[abstract]

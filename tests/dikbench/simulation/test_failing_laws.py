@@ -23,9 +23,9 @@ from dikbench.programs.quadratic_program import Program, QuadraticProgram
 from dikbench.robots.catalogue import load_robot
 from dikbench.scenario import Scenario
 from dikbench.scenario.certificate import Certificate
-from dikbench.scenario.plant import Drive, Plant, ideal
+from dikbench.scenario.plant import Ideal, Plant
 from dikbench.scenario.reference.reference import joint_path, target_at_rest
-from dikbench.simulation.closed_loop import FAR_CHECK, Run, simulate
+from dikbench.simulation.closed_loop import ERROR_CHECK_PERIOD, Run, simulate
 from dikbench.simulation.control_step import fallback
 from dikbench.simulation.status import STEP_CODE, Status
 from dikbench.solvers.catalogue.back_ends import parse_solver
@@ -74,13 +74,13 @@ def _run(
     law: Formulation | Callable[[DikProblem], Any],
     scenario: Scenario | None = None,
     *,
-    drive: Drive = ideal,
+    plant: Plant | None = None,
     mode: Any = "time",
     solve: CheckedSolve | None = None,
 ) -> Run:
     formulation = law if isinstance(law, Formulation) else _Law(law)
     chosen = make_solve(None, None) if solve is None else solve
-    return simulate(scenario or _scenario(), formulation, chosen, Plant(drive), mode)
+    return simulate(scenario or _scenario(), formulation, chosen, plant or Ideal(), mode)
 
 
 # --- how laws end a trial
@@ -151,7 +151,9 @@ def test_a_motion_without_bounds_is_ended() -> None:
     assert run.trace.steps == 0
 
 
-@pytest.mark.parametrize("jump", [1, FAR_CHECK - 1, FAR_CHECK, FAR_CHECK + 1])
+@pytest.mark.parametrize(
+    "jump", [1, ERROR_CHECK_PERIOD - 1, ERROR_CHECK_PERIOD, ERROR_CHECK_PERIOD + 1]
+)
 def test_a_target_that_runs_away_ends_a_run_at_the_next_look(jump: int) -> None:
     """The task error is looked at in one step out of so many, and then ends the run."""
     scenario = _scenario()
@@ -164,7 +166,7 @@ def test_a_target_that_runs_away_ends_a_run_at_the_next_look(jump: int) -> None:
 
     reference = replace(scenario.reference, placement=placement)
     run = _run(lambda problem: np.zeros(3), replace(scenario, reference=reference))
-    step = FAR_CHECK if jump <= FAR_CHECK else 2 * FAR_CHECK
+    step = ERROR_CHECK_PERIOD if jump <= ERROR_CHECK_PERIOD else 2 * ERROR_CHECK_PERIOD
     if step < 30:
         assert run.status is Status.DIVERGED
         assert run.message == f"step {step}: task error above 100 m, rad"

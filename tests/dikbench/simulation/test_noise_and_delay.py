@@ -15,7 +15,7 @@ from dikbench.problem.tasks import PoseTask
 from dikbench.robots.catalogue import load_robot
 from dikbench.scenario import Scenario
 from dikbench.scenario.certificate import Certificate
-from dikbench.scenario.plant import Plant, ideal, saturating
+from dikbench.scenario.plant import Ideal, Plant, Saturating
 from dikbench.scenario.reference.reference import joint_path
 from dikbench.simulation.closed_loop import Run, simulate
 from dikbench.solvers.checked_solve import make_solve
@@ -62,7 +62,7 @@ def _run(law: Any, plant: Plant, seed: int = 0) -> Run:
 def test_a_late_command_is_applied_so_many_steps_later() -> None:
     """Until the first one arrives the robot keeps the velocity that it had at the start."""
     law = _Law()
-    trace = _run(law, Plant(delay=3)).trace
+    trace = _run(law, Ideal(delay=3)).trace
     assert np.array_equal(trace.applied[3:], trace.commanded[:-3])
     assert np.array_equal(trace.applied[:3], np.tile(RATE, (3, 1)))
     # The law is told what was applied, not what it commanded.
@@ -71,7 +71,7 @@ def test_a_late_command_is_applied_so_many_steps_later() -> None:
 
 def test_without_delay_commands_are_applied_at_once() -> None:
     """The plain plant."""
-    trace = _run(_Law(), Plant()).trace
+    trace = _run(_Law(), Ideal()).trace
     assert np.array_equal(trace.applied, trace.commanded)
 
 
@@ -87,7 +87,7 @@ def test_a_delay_makes_a_tight_loop_unstable() -> None:
                 "q0": scenario.q0 + 0.01,
             }
         )
-        run = simulate(fast, _Law(), make_solve(None, None), Plant(delay=delay))
+        run = simulate(fast, _Law(), make_solve(None, None), Ideal(delay=delay))
         end = run.trace.q[-1] - (scenario.q0 + 2.0 * RATE)
         return float(np.abs(end).max())
 
@@ -98,7 +98,7 @@ def test_a_delay_makes_a_tight_loop_unstable() -> None:
 def test_noise_is_on_what_is_seen_not_on_the_robot() -> None:
     """The law sees q plus white noise of the given size; what is recorded is the true motion."""
     law = _Law()
-    trace = _run(law, Plant(noise=1e-3)).trace
+    trace = _run(law, Ideal(noise=1e-3)).trace
     noise = np.array(law.seen) - trace.q[:-1]
     assert noise.std() == pytest.approx(1e-3, rel=0.1)
     assert abs(noise.mean()) < 2e-4
@@ -110,7 +110,7 @@ def test_noise_is_on_what_is_seen_not_on_the_robot() -> None:
 
 def test_the_trials_seed_is_the_noises() -> None:
     """The same seed sees the same noise, another one another."""
-    a, b, c = (_run(_Law(), Plant(noise=1e-3), seed).trace.q for seed in (1, 1, 2))
+    a, b, c = (_run(_Law(), Ideal(noise=1e-3), seed).trace.q for seed in (1, 1, 2))
     assert np.array_equal(a, b)
     assert np.abs(a - c).max() > 1e-5
 
@@ -123,15 +123,15 @@ def test_the_saturating_drive_clips_by_the_true_configuration() -> None:
     tight = Scenario(
         **{**{f: getattr(scenario, f) for f in scenario.__dataclass_fields__}, "robot": robot}
     )
-    run = simulate(tight, _Law(), make_solve(None, None), Plant(saturating, noise=1e-2))
+    run = simulate(tight, _Law(), make_solve(None, None), Saturating(noise=1e-2))
     assert np.all(run.trace.q <= upper + 1e-12)
     assert np.abs(run.trace.q.max(axis=0) - upper).min() < 1e-12
 
 
 def test_selectors_of_plants() -> None:
     """A name, or a name with noise and delay."""
-    assert make_plant("ideal") == Plant(ideal)
-    assert make_plant("saturating[noise=1e-3,delay=2]") == Plant(saturating, 1e-3, 2)
+    assert make_plant("ideal") == Ideal()
+    assert make_plant("saturating[noise=1e-3,delay=2]") == Saturating(1e-3, 2)
 
 
 @pytest.mark.parametrize(

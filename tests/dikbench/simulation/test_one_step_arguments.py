@@ -20,7 +20,7 @@ FINE: dict[str, Any] = {"formulation": "dls", "twist": [0.1, 0, 0, 0, 0, 0]}
         ({"solver": 3}, "solver: expected a selector"),
         ({"tasks": None}, "tasks: expected a list"),
         ({"tasks": PostureTask(target=PANDA.q0)}, "tasks: expected a list"),
-        ({"formulation": 3}, "formulation: expected a law"),
+        ({"formulation": 3}, "formulation: expected a formulation"),
         (
             {"formulation": "qp", "solver": "osqp[eps_abs=-1]"},
             "eps_abs must be finite and at least 0",

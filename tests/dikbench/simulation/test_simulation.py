@@ -23,9 +23,10 @@ from dikbench.problem.tasks import PoseTask, PostureTask
 from dikbench.robots.catalogue import load_robot
 from dikbench.scenario import Scenario
 from dikbench.scenario.certificate import Certificate
-from dikbench.scenario.plant import Drive, Plant, ideal, saturating
+from dikbench.scenario.plant import Ideal, Plant, Saturating
 from dikbench.scenario.reference.reference import joint_path
-from dikbench.simulation.closed_loop import LONGEST, Run, simulate
+from dikbench.simulation.clock import LONGEST_PATH_RUN
+from dikbench.simulation.closed_loop import Run, simulate
 from dikbench.simulation.status import STEP_CODE, Status
 from dikbench.simulation.trace import Trace
 from dikbench.solvers.catalogue.back_ends import parse_solver
@@ -75,13 +76,13 @@ def _run(
     law: Formulation | Callable[[DikProblem], Any],
     scenario: Scenario | None = None,
     *,
-    drive: Drive = ideal,
+    plant: Plant | None = None,
     mode: Any = "time",
     solve: CheckedSolve | None = None,
 ) -> Run:
     formulation = law if isinstance(law, Formulation) else _Law(law)
     chosen = make_solve(None, None) if solve is None else solve
-    return simulate(scenario or _scenario(), formulation, chosen, Plant(drive), mode)
+    return simulate(scenario or _scenario(), formulation, chosen, plant or Ideal(), mode)
 
 
 # --- how long a run is
@@ -143,7 +144,7 @@ def test_a_path_indexed_reference_does_not_run_ahead_or_back() -> None:
 def test_a_path_indexed_run_gives_up_after_five_times_its_duration() -> None:
     """A law that stands still is not waited for for ever; the trial is ok, its steps are stuck."""
     run = _run(lambda problem: np.zeros(3), mode="path")
-    assert LONGEST == 5
+    assert LONGEST_PATH_RUN == 5
     assert run.status is Status.OK
     assert run.trace.steps == 150
     assert np.all(run.trace.tau == 0)
@@ -165,7 +166,7 @@ def test_a_law_sees_the_state_that_it_made() -> None:
     """The integral of what was applied, what was applied last, and the period."""
     law = _Law(lambda problem: 3 * _exact(problem))
     scenario = _scenario(velocity=1.0)
-    run = _run(law, scenario, drive=saturating)
+    run = _run(law, scenario, plant=Saturating())
     assert np.array_equal(law.seen[0].q, scenario.q0)
     assert np.array_equal(law.seen[0].v_prev, scenario.v0)
     clipped = 0
@@ -211,6 +212,23 @@ def test_a_scenario_survives_its_runs() -> None:
         assert np.array_equal(a, b)
 
 
+def test_what_a_law_does_to_its_problem_reaches_neither_record_nor_plant() -> None:
+    """It may put other arrays and limits into the problem: that is its own affair."""
+    scenario = _scenario(velocity=1.0)
+    free = scenario.robot.with_limits(velocity=None, position=None).limits.at(scenario.q0)
+
+    def spoil(problem: DikProblem) -> Array:
+        v = 10 * _exact(problem)
+        problem.limits = free
+        problem.tasks[0].V, problem.tasks[0].J = np.zeros(3), np.zeros((3, 3))
+        return v
+
+    for mode in ("time", "path"):
+        spoilt = _run(spoil, scenario, plant=Saturating(), mode=mode).trace
+        _same(spoilt, _run(lambda p: 10 * _exact(p), scenario, plant=Saturating(), mode=mode).trace)
+        assert np.abs(spoilt.applied).max() == 1.0
+
+
 # --- plants
 
 
@@ -233,10 +251,10 @@ def test_only_the_ideal_plant_lets_a_command_pass_the_limits(sign: float) -> Non
     def push(problem: DikProblem) -> Array:
         return np.full(3, sign * 5.0)
 
-    position, velocity = _beyond(_run(push, scenario, drive=ideal), scenario)
+    position, velocity = _beyond(_run(push, scenario, plant=Ideal()), scenario)
     assert position > 0.5
     assert velocity == pytest.approx(3.0 if sign > 0 else 3.5)
-    stopped = _run(push, scenario, drive=saturating)
+    stopped = _run(push, scenario, plant=Saturating())
     position, velocity = _beyond(stopped, scenario)
     assert abs(position) < 1e-12  # on the limit, not before it
     assert velocity <= 0.0
@@ -286,7 +304,7 @@ def test_the_same_run_gives_the_same_bits(law: str, solver: str, mode: Any) -> N
     def once(scenario: Scenario) -> Trace:
         formulation = make_formulation(law)
         solve = make_solve(parse_solver(solver) if solver else None, "qp")
-        return simulate(scenario, formulation, solve, Plant(saturating), mode).trace
+        return simulate(scenario, formulation, solve, Saturating(), mode).trace
 
     scenario = make_scenario("near-miss[miss=0.05,dt=0.01]", seed=1)
     first = once(scenario)
@@ -429,7 +447,7 @@ def test_a_run_brings_its_jacobians_and_its_times() -> None:
         assert run.jacobians.shape == (run.trace.steps, 3, 3)
         assert np.array_equal(run.jacobians, motion.jacobians[:-1])
         assert run.kinematics_ns > 0
-        assert run.law_ns > 0
+        assert run.formulation_ns > 0
     assert run.trace.steps == 7
     assert _run(lambda problem: None).jacobians.shape == (0, 3, 3)
 
@@ -442,7 +460,7 @@ def test_the_law_takes_its_own_time() -> None:
         return _exact(problem)
 
     run = _run(slow)
-    assert run.law_ns > 30 * 2e6
+    assert run.formulation_ns > 30 * 2e6
     assert run.kinematics_ns < 30 * 2e6
 
 

@@ -19,7 +19,7 @@ from dikbench.solvers.catalogue.presets import TOLERANCES
 from dikbench.solvers.checked_solve import CheckedSolve, NoSolve, make_solve
 from dikbench.solvers.interfaces.cold import ColdSolver
 from dikbench.solvers.recheck.optimum import JUDGE, PROVEN, distance_to_optimum
-from dikbench.solvers.recheck.rechecked import Verdicts
+from dikbench.solvers.recheck.rechecked import RecheckedSteps
 from dikbench.solvers.recheck.residuals import residuals
 from dikbench.solvers.recheck.stack import Stack
 
@@ -78,11 +78,11 @@ def test_counters_add_up_over_a_step_and_start_anew() -> None:
     solve.begin_step(0)
     solve(_one_bound())
     assert (solve.calls, solve.core_ns) == (1, 1000)
-    assert solve.verdicts().verified.tolist() == [1, -1, -1]
+    assert solve.rechecked().verified.tolist() == [1, -1, -1]
     solve(_one_bound())
     solve(_one_bound())
     assert (solve.calls, solve.core_ns) == (3, 3000)
-    found = solve.verdicts()
+    found = solve.rechecked()
     assert found.primal[0] == pytest.approx(0.25)
     assert found.dual[0] == pytest.approx(0.0)
     assert found.gap[0] == pytest.approx(abs(1.25 * -0.75 + 0.75))
@@ -95,7 +95,7 @@ def test_counters_add_up_over_a_step_and_start_anew() -> None:
     solve.begin_step(2)
     solve(_one_bound())
     assert script.sites == [0, 1, 2, 0]
-    found = solve.verdicts()
+    found = solve.rechecked()
     assert (found.primal[1], found.dual[1], found.gap[1], found.distance[1]) == (0.0,) * 4
     assert (found.primal[2], found.dual[2], found.gap[2]) == (0.0, 0.0, 0.0)
     assert found.verified.tolist() == [0, -1, 1]
@@ -106,12 +106,12 @@ def test_a_run_begins_with_nothing() -> None:
     """What was solved before it, rechecked or not, leaves no trace in it."""
     solve = CheckedSolve(_Script(_said(7.0, 0.0), _said(7.0, 0.0), _said(1.0, 1.0)))
     solve(_one_bound())
-    assert solve.verdicts().verified.tolist() == [0]
+    assert solve.rechecked().verified.tolist() == [0]
     solve(_one_bound())
     solve.begin_run(2)
     solve.begin_step(0)
     solve(_one_bound())
-    found = solve.verdicts()
+    found = solve.rechecked()
     assert (found.claimed.tolist(), found.verified.tolist()) == ([1, -1], [1, -1])
     assert found.primal.tolist() == [0.0, 0.0]
 
@@ -123,7 +123,7 @@ def test_unknown_residuals_of_a_step_stay_unknown(unknown_first: bool) -> None:
     solve = CheckedSolve(_Script(*(answers if unknown_first else answers[::-1])))
     solve(_one_bound())
     solve(_one_bound())
-    found = solve.verdicts()
+    found = solve.rechecked()
     assert math.isnan(found.dual[0])
     assert math.isnan(found.gap[0])
     assert found.primal[0] == 0.0
@@ -140,7 +140,7 @@ def test_a_flat_cost_hides_nothing() -> None:
     for step in range(2):
         solve.begin_step(step)
         solve(program)
-    found = solve.verdicts()
+    found = solve.rechecked()
     assert found.distance == pytest.approx([0.5, 0.0], abs=1e-9)
     assert found.verified.tolist() == [0, 1]
 
@@ -176,7 +176,7 @@ def test_a_lie_is_handed_out_and_recorded() -> None:
     """The law gets what the solver claimed; the record says that it is not verified."""
     solve = CheckedSolve(_Script(_said(7.0, 0.0)))
     assert solve(_one_bound()) == pytest.approx([7.0])
-    found = solve.verdicts()
+    found = solve.rechecked()
     assert found.primal[0] == pytest.approx(6.0)
     assert found.verified[0] == 0
 
@@ -194,7 +194,7 @@ def test_an_answer_that_is_not_claimed_is_not_handed_out() -> None:
         solve(_no_point())
     assert solve.calls == 1
     assert solve.checking_ns > 0
-    found = solve.verdicts()
+    found = solve.rechecked()
     assert found.claimed.tolist() == [0, 0]  # nothing was claimed: nothing to be caught
     assert found.verified.tolist() == [1, 0]
 
@@ -231,7 +231,7 @@ def test_what_is_claimed_and_what_is_verified(answer: Answer, claimed: int, veri
     for step in (0, 2):
         solve.begin_step(step)
         _ask(solve, _one_bound())
-    found = solve.verdicts()
+    found = solve.rechecked()
     assert found.claimed.tolist() == [claimed, -1, 1]
     assert found.verified.tolist() == [verified, -1, 1]
 
@@ -265,7 +265,7 @@ def test_a_step_takes_the_worst_of_its_answers(
         _ask(solve, program)
     solve.begin_step(1)
     solve(_one_bound())
-    found = solve.verdicts()
+    found = solve.rechecked()
     assert found.claimed.tolist() == [0, 1]
     assert found.verified.tolist() == [0, 1]
     assert found.primal == pytest.approx([2.0, 0.0])
@@ -293,7 +293,7 @@ def _program(random: np.random.Generator, n: int, kind: int) -> QuadraticProgram
     return QuadraticProgram(P, random.normal(size=n), G, h, A, b, -bound, bound)
 
 
-def _run(seed: int, steps: int = 25) -> Verdicts:
+def _run(seed: int, steps: int = 25) -> RecheckedSteps:
     """What is found on a run of up to four answers per step: right, wrong, none, unexplained."""
     random = np.random.default_rng(seed)
     exact = ColdSolver(JUDGE)
@@ -320,7 +320,7 @@ def _run(seed: int, steps: int = 25) -> Verdicts:
                 answer.z_box = None
             script.answers.append(answer)
             _ask(solve, program)
-    return solve.verdicts()
+    return solve.rechecked()
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -351,10 +351,10 @@ def test_the_recheck_keeps_to_its_batches(monkeypatch: pytest.MonkeyPatch) -> No
     """No more than so many answers wait, and whole steps are rechecked."""
     waiting: list[int] = []
 
-    def note(verdicts: Verdicts, solved: list[Any], tolerance: float) -> None:
+    def note(verdicts: RecheckedSteps, solved: list[Any], tolerance: float) -> None:
         waiting.append(len(solved))
 
-    monkeypatch.setattr(Verdicts, "judge", note)
+    monkeypatch.setattr(RecheckedSteps, "recheck", note)
     monkeypatch.setattr(checked_solve, "BATCH", 3)
     solve = CheckedSolve(_Script(*(_said(1.0, 1.0) for _ in range(10))))
     solve.begin_run(5)
@@ -362,7 +362,7 @@ def test_the_recheck_keeps_to_its_batches(monkeypatch: pytest.MonkeyPatch) -> No
         solve.begin_step(step)
         solve(_one_bound())
         solve(_one_bound())
-    solve.verdicts()
+    solve.rechecked()
     assert waiting == [4, 4, 2]
 
 
@@ -372,7 +372,7 @@ def test_without_checks_nothing_is_kept() -> None:
     assert solve(_one_bound()) == pytest.approx([7.0])
     with pytest.raises(SolverFailed):
         solve(_no_point())
-    found = solve.verdicts()
+    found = solve.rechecked()
     assert (found.claimed.tolist(), found.verified.tolist()) == ([-1], [-1])
 
 
@@ -383,7 +383,7 @@ def test_the_tolerance_is_the_presets() -> None:
         solver = parse_solver(f"osqp[preset={preset}]")
         solve = CheckedSolve(_Script(beside), tolerance=solver.tolerance)
         solve(_one_bound())
-        assert solve.verdicts().verified.tolist() == [verified]
+        assert solve.rechecked().verified.tolist() == [verified]
 
 
 def test_without_a_program_solving_is_an_error() -> None:

@@ -131,7 +131,7 @@ def test_every_solver_solves_a_known_quadratic_program(
     program, x = example()
     solve = _solve(call)
     assert solve(program) == pytest.approx(x, abs=ACCURACY)
-    assert solve.verdicts().verified.tolist() == [1]
+    assert solve.rechecked().verified.tolist() == [1]
 
 
 @pytest.mark.parametrize("example", [_linear, _scaling])
@@ -154,7 +154,7 @@ def test_a_program_in_modelling_words_gives_its_unknowns_stacked(name: str) -> N
     solve = _solve(name, "cvxpy")
     answer = solve(ModelledProgram(model, (v, alpha), lambda: program))
     assert answer == pytest.approx(x, abs=ACCURACY)
-    assert solve.verdicts().verified.tolist() == [1]
+    assert solve.rechecked().verified.tolist() == [1]
     assert solve.calls == 1
 
 
@@ -206,7 +206,7 @@ def test_an_inconsistent_equality_is_never_verified(call: str) -> None:
         solve(_contradiction())
     except Infeasible:
         return
-    found = solve.verdicts()
+    found = solve.rechecked()
     assert found.verified.tolist() == [0]
     assert found.primal[0] >= 0.5 - 1e-9  # no x is nearer to both
 
@@ -257,7 +257,7 @@ def test_the_exact_wrist_singularity_is_never_verified(call: str, direction: int
         solve(program)
     except Infeasible:
         return
-    found = solve.verdicts()
+    found = solve.rechecked()
     assert found.verified.tolist() == [0]
     # No J v has the lost half of a unit twist: the largest of six rows misses its share.
     assert found.primal[0] >= 0.5 / np.sqrt(6) - 1e-9

@@ -66,7 +66,7 @@ def test_warm_and_cold_agree_under_the_finest_preset(law: str, name: str, scenar
         for step, problem in enumerate(problems):
             solve.begin_step(step)
             found.append(_answer(law, problem, _Kept(solve)))
-        ways.append((found, solve.verdicts()))
+        ways.append((found, solve.rechecked()))
     (cold, _), (warm, verdicts) = ways
     worst_velocity = worst_cost = 0.0
     for one, other in zip(cold, warm, strict=True):

@@ -18,7 +18,7 @@ from dikbench.report.figures.joint_margins import draw_joint_margins, joint_marg
 from dikbench.report.figures.time_series import draw_time_series
 from dikbench.report.selection.stored_motions import in_panels, thinned
 from dikbench.results.folder import ResultsFolder
-from dikbench.scenario.plant import Plant
+from dikbench.scenario.plant import Ideal
 from dikbench.simulation.closed_loop import simulate
 from dikbench.simulation.trace import Trace
 from dikbench.solvers.checked_solve import make_solve
@@ -36,7 +36,7 @@ def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "traces").mkdir()
     scenario = make_scenario(CROSSING)
     for number, formulation in enumerate(LAWS):
-        run = simulate(scenario, make_formulation(formulation), make_solve(None, None), Plant())
+        run = simulate(scenario, make_formulation(formulation), make_solve(None, None), Ideal())
         run.trace.save(folder / "traces" / f"{number:016x}.arrow")
     return folder
 
@@ -69,7 +69,7 @@ def test_errors_and_speeds_are_those_of_the_motion(
     errors = columns["position error [mm]"]
     speeds = columns["largest joint speed over limit"]
     assert errors.keys() == speeds.keys() == set(LAWS)
-    for number, law in enumerate(LAWS):
+    for number, formulation in enumerate(LAWS):
         motion = stored_motion(stored, number)
         limit = motion.scenario.robot.limits.velocity
         assert limit is not None
@@ -106,7 +106,7 @@ def test_margins_are_distances_to_the_nearest_limit(
         (figure,) = draw_joint_margins(ResultsFolder(stored), trials, "reach", target)
     shown = curves(drawn[0].axes)
     assert shown.keys() == set(LAWS)
-    for number, law in enumerate(LAWS):
+    for number, formulation in enumerate(LAWS):
         margin = joint_margin(stored_motion(stored, number))
         assert shown[law].get_ydata().min() == margin.min() < 0.0
         assert shown[law].get_ydata()[0] == margin[0] > 0.0

@@ -17,7 +17,7 @@ from dikbench.report.tables.return_codes import return_codes
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
 from dikbench.run.trial_row import run_trial
-from dikbench.scenario.plant import Plant, saturating
+from dikbench.scenario.plant import Saturating
 from dikbench.simulation.closed_loop import simulate
 from dikbench.simulation.status import Status
 from dikbench.solvers.catalogue.back_ends import parse_solver
@@ -50,7 +50,7 @@ def test_the_false_success_at_the_exact_wrist_is_caught() -> None:
     """One solver calls it solved with the equality off by most of a metre per second."""
     solve = make_solve(parse_solver("daqp"), "qp")
     x = solve(impossible())  # handed out: it was claimed
-    verdicts = solve.verdicts()
+    verdicts = solve.rechecked()
     off = float(np.abs(impossible().A @ x - impossible().b).max())  # type: ignore[operator]
     assert off > 0.1
     assert (verdicts.claimed[0], verdicts.verified[0]) == (1, 0)
@@ -63,7 +63,7 @@ def test_others_say_that_there_is_no_answer(selector: str) -> None:
     solve = make_solve(parse_solver(selector), "qp")
     with pytest.raises(Exception, match="no feasible point"):
         solve(impossible())
-    verdicts = solve.verdicts()
+    verdicts = solve.rechecked()
     assert (verdicts.claimed[0], verdicts.verified[0]) == (0, 0)
 
 
@@ -88,7 +88,7 @@ def test_claims_and_verdicts_of_a_run_reach_the_trace() -> None:
     """Near a singularity the equality is infeasible at most steps, and no lie is an `ok`."""
     scenario = make_scenario("near-miss[robot=ur5,miss=0.005]")
     solve = make_solve(parse_solver("daqp"), "qp")
-    trace = simulate(scenario, HardEquality(), solve, Plant(saturating)).trace
+    trace = simulate(scenario, HardEquality(), solve, Saturating()).trace
     lied = (trace.claimed == 1) & (trace.verified == 0)
     assert trace.share(Status.NOT_VERIFIED) == np.mean(lied)
     assert (trace.claimed == 0).any()

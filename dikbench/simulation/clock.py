@@ -1,0 +1,116 @@
+"""Clocks: how a reference moves on during a trial, with time or with the progress achieved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, Final, Literal, Protocol
+
+import numpy as np
+
+from dikbench.arrays import Array
+from dikbench.problem.progress import progress, row_weights
+from dikbench.scenario.scenario import Scenario
+
+ReferenceMode = Literal["time", "path"]
+
+LONGEST_PATH_RUN: Final = 5
+"""A path-indexed run ends with its path, or after this many times its nominal duration."""
+
+PATH_END_TOLERANCE: Final = 1e-9
+"""A path has ended when at most this share of it is left."""
+
+
+class Clock(Protocol):
+    """The nominal time of a trial, which begins at 0 and moves on at every control step.
+
+    Attributes:
+        tau: nominal time on the reference [s].
+        most_steps: number of control steps after which the trial is over in any case.
+    """
+
+    tau: float
+    most_steps: int
+
+    def __init__(self, scenario: Scenario) -> None: ...
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the trial has come to its end."""
+        ...
+
+    def target(self) -> tuple[Any, Any]:
+        """Placement (`pinocchio.SE3`) and body twist (`pinocchio.Motion`) of the reference."""
+        ...
+
+    def advance(self, wanted: Array, jacobian: Array, applied: Array) -> None:
+        """Move on after a control step.
+
+        Args:
+            wanted: desired twist V of the tracking task, (m,) [m/s; rad/s].
+            jacobian: its Jacobian J, (m, nv).
+            applied: the velocity that the plant applied, (nv,) [rad/s or m/s].
+        """
+        ...
+
+
+class TimeClock:
+    """Moves on by one control period at every step, whatever the robot does: tau = k dt."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.tau = 0.0
+        self.most_steps = scenario.steps
+        self._step, self._dt, self._targets = 0, scenario.dt, scenario.targets
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the scenario's duration has passed."""
+        return self._step == self.most_steps
+
+    def target(self) -> tuple[Any, Any]:
+        """See `Clock`; the targets are computed once for all trials of a scenario."""
+        target: tuple[Any, Any] = self._targets[self._step]
+        return target
+
+    def advance(self, wanted: Array, jacobian: Array, applied: Array) -> None:
+        """Move on by one control period (see `Clock`)."""
+        self._step += 1
+        self.tau = self._step * self._dt
+
+
+class PathClock:
+    """Waits for the robot: moves on by the share of the desired motion that was made.
+
+    tau <- tau + dt min(max(alpha, 0), 1) with alpha = <J v, V>/|V|^2 (see `progress`); where no
+    motion is desired (a dwell) it moves on by dt.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.tau = 0.0
+        self.most_steps = LONGEST_PATH_RUN * scenario.steps
+        self._step, self._dt, self._target = 0, scenario.dt, scenario.target
+        self._duration = scenario.reference.duration
+        self._weights = row_weights(scenario.rows)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the path has ended, or `LONGEST_PATH_RUN` durations have passed."""
+        there = self.tau >= self._duration * (1 - PATH_END_TOLERANCE)
+        return there or self._step == self.most_steps
+
+    def target(self) -> tuple[Any, Any]:
+        """See `Clock`."""
+        return self._target(self.tau)
+
+    def advance(self, wanted: Array, jacobian: Array, applied: Array) -> None:
+        """Move on by the progress achieved (see `Clock`)."""
+        achieved = jacobian @ applied
+        alpha = float(progress(wanted[None], achieved[None], self._weights)[0])
+        share = 1.0 if np.isnan(alpha) else min(max(alpha, 0.0), 1.0)
+        self._step += 1
+        self.tau = min(self.tau + self._dt * share, self._duration)
+
+
+CLOCKS: Final[Mapping[ReferenceMode, type[Clock]]] = MappingProxyType(
+    {"time": TimeClock, "path": PathClock}
+)

@@ -1,0 +1,37 @@
+"""The joint motion behind a scenario, given to the harness as a formulation: the oracle row."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import pinocchio as pin
+
+from dikbench.arrays import Array
+from dikbench.problem.problem import DikProblem, Solve
+from dikbench.scenario.scenario import Scenario
+
+
+@dataclass(frozen=True, eq=False)
+class OracleFormulation:
+    """Commands the velocities of a known joint motion one after the other, whatever the problem.
+
+    It is used up by one run.
+
+    Attributes:
+        velocities: (nv,) [rad/s] each, one per control step.
+    """
+
+    velocities: Iterator[Array]
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> OracleFormulation:
+        """Command the joint motion from which a scenario's path was built (`Scenario.oracle`)."""
+        q = scenario.oracle
+        assert q is not None
+        model, dt = scenario.robot.model, scenario.dt
+        return cls(pin.difference(model, q[k], q[k + 1]) / dt for k in range(len(q) - 1))
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """Command the next velocity."""
+        return next(self.velocities)
