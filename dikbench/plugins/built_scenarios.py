@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import make_scenario
+from dikbench.plugins.building import make_scenario
 from dikbench.scenario.scenario import Scenario
 
 

@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError, unknown
-from dikbench.plugins.registry import make_formulation
+from dikbench.plugins.building import make_formulation
 from dikbench.problem.constraints import Constraint, linearize_all
 from dikbench.problem.problem import DikProblem, Formulation, program_of
 from dikbench.problem.progress import STUCK_PROGRESS, progress, row_weights

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 
 from dikbench.errors import DikbenchError, unknown
-from dikbench.plugins.registry import (
+from dikbench.plugins.building import (
     make_formulation,
     make_plant,
     make_scenario,

@@ -14,7 +14,8 @@ from statistics import median
 from time import perf_counter
 
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import Plugin, make_scenario, plugins
+from dikbench.plugins.building import make_scenario
+from dikbench.plugins.finding import Plugin, plugins
 
 BUILDS = 5
 

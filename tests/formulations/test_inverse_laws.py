@@ -12,7 +12,7 @@ from hypothesis.extra import numpy as arrays
 
 from dikbench import DikProblem, LinearizedTask, load_robot
 from dikbench.arrays import Array
-from dikbench.plugins.registry import make_formulation
+from dikbench.plugins.building import make_formulation
 from dikbench.robots.kinematics import Kinematics
 from dikbench.solvers.checked_solve import make_solve
 from dikbench.testing.states import SINGULAR

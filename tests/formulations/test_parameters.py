@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dikbench import DikbenchError
-from dikbench.plugins.registry import make_formulation
+from dikbench.plugins.building import make_formulation
 
 NOT_NEGATIVE = [
     ("pinv", "rank_tolerance"),

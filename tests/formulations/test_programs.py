@@ -14,7 +14,7 @@ from hypothesis.extra.numpy import arrays
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError, Infeasible, SolverFailed
 from dikbench.linear_algebra import null_space
-from dikbench.plugins.registry import make_formulation
+from dikbench.plugins.building import make_formulation
 from dikbench.problem import DikProblem, program_of
 from dikbench.problem.tasks import LinearizedTask, OrientationTask, PositionTask, PostureTask
 from dikbench.robots.catalogue import load_robot

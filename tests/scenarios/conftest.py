@@ -8,7 +8,7 @@ import pytest
 
 from dikbench.metrics import evaluate
 from dikbench.metrics.motion import recompute
-from dikbench.plugins.registry import make_formulation, make_plant
+from dikbench.plugins.building import make_formulation, make_plant
 from dikbench.problem import program_of
 from dikbench.scenario import Scenario
 from dikbench.simulation.closed_loop import simulate

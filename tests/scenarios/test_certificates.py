@@ -13,7 +13,8 @@ import pytest
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import make_scenario, plugins
+from dikbench.plugins.building import make_scenario
+from dikbench.plugins.finding import plugins
 from dikbench.problem.tasks import PostureTask
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics

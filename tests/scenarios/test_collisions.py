@@ -14,7 +14,7 @@ import pytest
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.metrics.motion import recompute
-from dikbench.plugins.registry import make_formulation, make_scenario
+from dikbench.plugins.building import make_formulation, make_scenario
 from dikbench.problem import program_of
 from dikbench.problem.constraints import CollisionConstraint
 from dikbench.robots.kinematics import Kinematics

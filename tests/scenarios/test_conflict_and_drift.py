@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import make_scenario
+from dikbench.plugins.building import make_scenario
 from dikbench.problem.tasks import PositionTask
 from dikbench.robots.kinematics import Kinematics
 from scenarios.task_conflict import CONFLICTS

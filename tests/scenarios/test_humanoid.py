@@ -13,7 +13,8 @@ import pytest
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import make_formulation, make_scenario, plugins
+from dikbench.plugins.building import make_formulation, make_scenario
+from dikbench.plugins.finding import plugins
 from dikbench.problem import program_of
 from dikbench.problem.tasks import PoseTask
 from dikbench.robots.catalogue import load_robot

@@ -13,7 +13,7 @@ import pytest
 from dikbench.errors import DikbenchError
 from dikbench.metrics import evaluate
 from dikbench.metrics.motion import recompute
-from dikbench.plugins.registry import make_plant, make_scenario
+from dikbench.plugins.building import make_plant, make_scenario
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
 from dikbench.simulation.closed_loop import simulate

@@ -13,7 +13,7 @@ import pytest
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import make_scenario
+from dikbench.plugins.building import make_scenario
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics, smallest_singular_value
 from dikbench.robots.robot import Robot

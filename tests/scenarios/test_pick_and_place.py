@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import make_scenario
+from dikbench.plugins.building import make_scenario
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
 from scenarios.pick_and_place import ROBOTS

@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import make_scenario
+from dikbench.plugins.building import make_scenario
 from dikbench.robots.kinematics import Kinematics
 from dikbench.scenario import Scenario
 from dikbench.scenario.oracle import solve_placement

@@ -10,7 +10,7 @@ import pytest
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import make_formulation, make_scenario
+from dikbench.plugins.building import make_formulation, make_scenario
 from dikbench.problem import program_of
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.robot import Robot

@@ -11,7 +11,7 @@ from typing import Final
 import pandas as pd
 
 from dikbench.plugins.built_scenarios import built
-from dikbench.plugins.registry import plugins
+from dikbench.plugins.finding import plugins
 from dikbench.report.contents.docstring import Docstring, parse_docstring
 from dikbench.report.contents.references import references
 from dikbench.scenario.oracle import ORACLE
@@ -135,9 +135,9 @@ def _described(name: str) -> tuple[str | None, dict[str, str], Path | None]:
     defaults = {
         key: str(parameter.default)
         for key, parameter in plugin.parameters.items()
-        if parameter.default is not parameter.empty
+        if not parameter.required
     }
-    return plugin.documented.__doc__ or "", defaults, Path(plugin.file)
+    return plugin.factory.__doc__ or "", defaults, Path(plugin.file)
 
 
 def _read(file: Path, class_name: str) -> tuple[str | None, dict[str, str]]:
@@ -173,7 +173,7 @@ def families_of(trials: pd.DataFrame) -> list[Family]:
         found.append(
             Family(
                 name,
-                parse_docstring(plugin.documented.__doc__ or "") if plugin else None,
+                parse_docstring(plugin.factory.__doc__ or "") if plugin else None,
                 certified,
                 len(selectors) - len(certified),
                 variation,

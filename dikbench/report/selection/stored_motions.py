@@ -11,7 +11,7 @@ import pandas as pd
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.metrics.motion import Motion, recompute
-from dikbench.plugins.registry import make_scenario
+from dikbench.plugins.building import make_scenario
 from dikbench.report.selection.rows import error_column, one_way, ranked
 from dikbench.results.folder import ResultsFolder
 from dikbench.simulation.trace import Trace

@@ -14,7 +14,7 @@ import pytest
 
 from dikbench.cli.listing import listing
 from dikbench.metrics import METRICS
-from dikbench.plugins.registry import plugins
+from dikbench.plugins.finding import plugins
 
 LAW = '''
 from __future__ import annotations

@@ -12,7 +12,7 @@ import pytest
 from dikbench.arrays import Array
 from dikbench.metrics import METRICS
 from dikbench.metrics.motion import Motion, recompute
-from dikbench.plugins.registry import make_formulation, make_scenario
+from dikbench.plugins.building import make_formulation, make_scenario
 from dikbench.scenario import Scenario
 from dikbench.scenario.plant import Plant
 from dikbench.scenario.reference.curves import circle

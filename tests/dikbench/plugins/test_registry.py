@@ -9,12 +9,8 @@ from typing import Any
 import pytest
 
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import (
-    formulation_plugin,
-    make_formulation,
-    make_scenario,
-    plugins,
-)
+from dikbench.plugins.building import make_formulation, make_scenario
+from dikbench.plugins.finding import formulation_plugin, plugins
 from formulations.damped_least_squares import DampedLeastSquares
 from formulations.pseudo_inverse import PseudoInverse
 

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from dikbench.metrics.motion import Motion, recompute
-from dikbench.plugins.registry import make_formulation, make_scenario
+from dikbench.plugins.building import make_formulation, make_scenario
 from dikbench.report.drawing.style import style
 from dikbench.report.figures.every import draw_figures
 from dikbench.report.figures.joint_margins import draw_joint_margins, joint_margin
