@@ -11,14 +11,13 @@ from typing import Any, Literal
 import numpy as np
 import pinocchio as pin
 
+from dikbench.problem import Array, Robot
 from dikbench.scenario import (
-    Array,
     Case,
     Claim,
     Family,
     Perturbation,
     Reference,
-    Robot,
     Variation,
     placement_of,
     solve_placement,

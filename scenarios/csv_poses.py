@@ -8,15 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from dikbench.errors import DikbenchError
+from dikbench.problem import Array, Robot
 from dikbench.scenario import (
-    Array,
     Case,
     Claim,
     Family,
     Perturbation,
     PoseFile,
     Reference,
-    Robot,
     Variation,
     measure_motion,
     read_poses,

@@ -9,15 +9,12 @@ from typing import Annotated, Literal
 import numpy as np
 import pinocchio as pin
 
+from dikbench.problem import Array, Drawn, Range, Robot
 from dikbench.scenario import (
-    Array,
     Case,
     Claim,
-    Drawn,
     Family,
     Perturbation,
-    Range,
-    Robot,
     Variation,
     joint_oracle,
     placement_of,

@@ -11,17 +11,13 @@ from typing import Annotated, Literal
 import numpy as np
 import pinocchio as pin
 
+from dikbench.problem import Array, Drawn, PositionTask, Range, Robot
 from dikbench.scenario import (
-    Array,
     Case,
     Claim,
-    Drawn,
     Family,
     Perturbation,
-    PositionTask,
-    Range,
     Reference,
-    Robot,
     Variation,
     placement_of,
     plane_of,

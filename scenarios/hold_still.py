@@ -11,14 +11,12 @@ from typing import Annotated, Literal
 import numpy as np
 
 from dikbench.errors import DikbenchError
+from dikbench.problem import Array, Drawn, Robot
 from dikbench.scenario import (
-    Array,
     Case,
     Claim,
-    Drawn,
     Family,
     Perturbation,
-    Robot,
     Variation,
     joint_oracle,
     placement_of,

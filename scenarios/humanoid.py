@@ -9,22 +9,24 @@ from typing import Annotated, Any, Literal
 import numpy as np
 import pinocchio as pin
 
-from dikbench.scenario import (
-    POSTURE_WEIGHT,
+from dikbench.problem import (
     Array,
-    Case,
     CentreOfMassTask,
-    Claim,
     Drawn,
-    Family,
     Kinematics,
-    OracleMotion,
-    Perturbation,
     PoseTask,
     PostureTask,
     Range,
     Robot,
     TrackingTogether,
+)
+from dikbench.scenario import (
+    POSTURE_WEIGHT,
+    Case,
+    Claim,
+    Family,
+    OracleMotion,
+    Perturbation,
     Variation,
     circle,
     oracle_motion,

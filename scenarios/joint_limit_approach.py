@@ -7,14 +7,12 @@ from typing import Annotated, Literal
 
 import numpy as np
 
+from dikbench.problem import Drawn, Range, Robot
 from dikbench.scenario import (
     Case,
     Claim,
-    Drawn,
     Family,
     Perturbation,
-    Range,
-    Robot,
     Variation,
     at_constant_rate,
     joint_oracle,

@@ -11,15 +11,12 @@ from typing import Annotated, Literal
 import numpy as np
 
 from dikbench.errors import DikbenchError
+from dikbench.problem import Array, Drawn, Range, Robot
 from dikbench.scenario import (
-    Array,
     Case,
     Claim,
-    Drawn,
     Family,
     Perturbation,
-    Range,
-    Robot,
     Variation,
     joint_oracle,
     joint_path,

@@ -10,17 +10,13 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.errors import DikbenchError
+from dikbench.problem import Array, Drawn, PoseTask, Range, Robot
 from dikbench.scenario import (
-    Array,
     Case,
     Claim,
-    Drawn,
     Family,
     Perturbation,
-    PoseTask,
-    Range,
     Reference,
-    Robot,
     Time,
     Variation,
     joint_oracle,

@@ -11,19 +11,16 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.errors import DikbenchError
+from dikbench.problem import Array, Drawn, Range, Robot
 from dikbench.scenario import (
-    Array,
     Case,
     Certificate,
     Claim,
-    Drawn,
     Family,
     Kind,
     OracleMotion,
     Perturbation,
-    Range,
     Reference,
-    Robot,
     Singularity,
     Variation,
     analyse,

@@ -11,21 +11,16 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.errors import DikbenchError
+from dikbench.problem import Array, CollisionConstraint, Drawn, Kinematics, Range, Robot, null_space
 from dikbench.scenario import (
-    Array,
     BoxObstacle,
     CapsuleObstacle,
     Case,
     Claim,
-    CollisionConstraint,
-    Drawn,
     Family,
-    Kinematics,
     Obstacle,
     Perturbation,
-    Range,
     Reference,
-    Robot,
     SphereObstacle,
     Variation,
     collision_claims,
@@ -33,7 +28,6 @@ from dikbench.scenario import (
     influence_distance,
     joint_path,
     measure_motion,
-    null_space,
     solve_placement,
 )
 

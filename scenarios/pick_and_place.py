@@ -8,15 +8,12 @@ from typing import Annotated, Any
 import numpy as np
 import pinocchio as pin
 
+from dikbench.problem import Array, Drawn, Range, Robot
 from dikbench.scenario import (
-    Array,
     Case,
-    Drawn,
     Family,
     Perturbation,
-    Range,
     Reference,
-    Robot,
     Variation,
     check_can_lift,
     duration_at,

@@ -9,13 +9,11 @@ from typing import Annotated
 import numpy as np
 import pinocchio as pin
 
+from dikbench.problem import Drawn, Range, Robot
 from dikbench.scenario import (
     Case,
-    Drawn,
     Family,
     Perturbation,
-    Range,
-    Robot,
     Time,
     Variation,
     motion_of_a_step,

@@ -9,14 +9,11 @@ from typing import Annotated, Literal
 
 import numpy as np
 
+from dikbench.problem import CollisionConstraint, Drawn, Range, Robot
 from dikbench.scenario import (
     Case,
-    CollisionConstraint,
-    Drawn,
     Family,
     Perturbation,
-    Range,
-    Robot,
     Variation,
     collision_claims,
     duration_at,

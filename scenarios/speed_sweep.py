@@ -8,14 +8,12 @@ from functools import partial
 from types import MappingProxyType
 from typing import Annotated, Literal
 
+from dikbench.problem import Drawn, Range, Robot
 from dikbench.scenario import (
     Case,
-    Drawn,
     Family,
     Perturbation,
-    Range,
     Reference,
-    Robot,
     Variation,
     circle,
     duration_at,

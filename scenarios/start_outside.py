@@ -9,14 +9,12 @@ from typing import Annotated, Literal
 
 import numpy as np
 
+from dikbench.problem import Drawn, Range, Robot
 from dikbench.scenario import (
     Case,
     Claim,
-    Drawn,
     Family,
     Perturbation,
-    Range,
-    Robot,
     Time,
     Variation,
     at_constant_rate,

@@ -10,14 +10,12 @@ from typing import Annotated, Literal
 import numpy as np
 import pinocchio as pin
 
+from dikbench.problem import Drawn, Range, Robot
 from dikbench.scenario import (
     Case,
     Claim,
-    Drawn,
     Family,
     Perturbation,
-    Range,
-    Robot,
     Time,
     Variation,
     motion_of_a_step,

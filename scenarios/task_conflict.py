@@ -11,25 +11,27 @@ from typing import Annotated, Literal
 import numpy as np
 import pinocchio as pin
 
-from dikbench.scenario import (
+from dikbench.problem import (
     Array,
-    Case,
-    Claim,
     Drawn,
-    Family,
-    Gain,
     Kinematics,
-    Perturbation,
     PoseTask,
     PositionTask,
     Range,
     Robot,
     TrackingTask,
-    Variation,
     damped_least_squares,
+    null_space,
+)
+from dikbench.scenario import (
+    Case,
+    Claim,
+    Family,
+    Gain,
+    Perturbation,
+    Variation,
     joint_oracle,
     joint_path,
-    null_space,
     samples,
     there_and_back,
     usual_claims,

@@ -9,17 +9,13 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.errors import DikbenchError
+from dikbench.problem import Array, Drawn, Range, Robot, TorqueConstraint
 from dikbench.scenario import (
-    Array,
     Case,
     Claim,
-    Drawn,
     Family,
     OracleMotion,
     Perturbation,
-    Range,
-    Robot,
-    TorqueConstraint,
     Variation,
     check_can_lift,
     effort_limits,

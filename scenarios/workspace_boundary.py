@@ -11,17 +11,14 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.errors import DikbenchError
+from dikbench.problem import Array, Drawn, Range, Robot
 from dikbench.scenario import (
-    Array,
     Case,
     Claim,
-    Drawn,
     Family,
     OracleMotion,
     Perturbation,
-    Range,
     Reference,
-    Robot,
     Variation,
     measure_motion,
     placement_of,
