@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 from dikbench.arrays import Array
-from dikbench.parameters import Parameters, Range
+from dikbench.parameters import Parameters, Range, parameters_of
 from dikbench.problem.constraints import Constraint
 from dikbench.problem.tasks import PoseTask, Task, TrackingTask
 from dikbench.robots.catalogue import load_robot
@@ -153,3 +153,8 @@ class Family(Parameters, ABC):
         """
         instants = samples(reference.duration, self.dt, most)
         return oracle_motion(robot, reference, q0, instants, tracking)
+
+
+def certified_robots(family: type[Family]) -> tuple[str, ...]:
+    """Robots on which a family's defaults are certified: those of its type, else its `robots`."""
+    return parameters_of(family)["robot"].choices or family.robots

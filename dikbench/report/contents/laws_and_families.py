@@ -11,7 +11,7 @@ from typing import Final
 import pandas as pd
 
 from dikbench.plugins.built_scenarios import built
-from dikbench.plugins.finding import plugins
+from dikbench.plugins.finding import in_file, plugins
 from dikbench.report.contents.docstring import Docstring, parse_docstring
 from dikbench.report.contents.references import references
 from dikbench.scenario.oracle import ORACLE
@@ -126,9 +126,8 @@ def _described(name: str) -> tuple[str | None, dict[str, str], Path | None]:
             {},
             None,
         )
-    path, colon, class_name = name.rpartition(":")
-    if colon and path.endswith(".py"):
-        return *_read(Path(path), class_name), None
+    if in_file(name):
+        return *_read(name), None
     plugin = plugins("formulation").get(name)
     if plugin is None:
         return None, {}, None
@@ -140,9 +139,11 @@ def _described(name: str) -> tuple[str | None, dict[str, str], Path | None]:
     return plugin.factory.__doc__ or "", defaults, Path(plugin.file)
 
 
-def _read(file: Path, class_name: str) -> tuple[str | None, dict[str, str]]:
+def _read(name: str) -> tuple[str | None, dict[str, str]]:
+    """Read docstring and defaults of a class that is given as `path/to/file.py:Class`."""
+    path, _, class_name = name.rpartition(":")
     try:
-        tree = ast.parse(file.read_text(encoding="utf-8"))
+        tree = ast.parse(Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError, SyntaxError):
         return None, {}
     for node in ast.walk(tree):
@@ -169,11 +170,12 @@ def families_of(trials: pd.DataFrame) -> list[Family]:
     found = []
     for name, selectors in groups.items():
         plugin = known.get(name)
+        text = plugin.factory.__doc__ or "" if plugin else _read(name)[0] if in_file(name) else None
         certified, variation = _certified(selectors[:MOST_CERTIFICATES], seed)
         found.append(
             Family(
                 name,
-                parse_docstring(plugin.factory.__doc__ or "") if plugin else None,
+                None if text is None else parse_docstring(text),
                 certified,
                 len(selectors) - len(certified),
                 variation,
