@@ -248,7 +248,7 @@ def _read(plugin: type, field: dataclasses.Field[Any]) -> Parameter:
     else:
         number: dict[type, Any] = {bool: bool, int: int | float, float: float}
         kind = number.get(type(default), str)
-    numeric = bool({int, float} & {kind, *typing.get_args(kind)})
+    numeric = any(part in (int, float) for part in (kind, *typing.get_args(kind)))
     parameter = Parameter(
         field.name,
         kind,

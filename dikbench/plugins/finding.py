@@ -169,7 +169,8 @@ def _class_from_file(kind: Kind, path: str, class_name: str) -> type:
     module = _module_from_file(kind, path)
     found = getattr(module, class_name, None)
     if not isinstance(found, type):
-        classes = [name for name, value in vars(module).items() if isinstance(value, type)]
+        own = [value for value in vars(module).values() if isinstance(value, type)]
+        classes = [value.__name__ for value in own if value.__module__ == module.__name__]
         raise unknown("class", class_name, classes, f"in {path}")
     return found
 
