@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
-from dikbench.errors import DikbenchError
 from dikbench.problem import (
     Array,
     Braking,
     DikProblem,
     LimitKind,
     LinearizedJointTask,
+    Parameters,
     Program,
     QuadraticProgram,
+    Range,
     Solve,
     null_space,
 )
@@ -24,7 +25,7 @@ from formulations.null_space_program import limits_about
 
 
 @dataclass(frozen=True)
-class AlphaTwoStage:
+class AlphaTwoStage(Parameters):
     """Alpha scaling in two stages: as far as the limits allow, then the posture, which cannot leak.
 
         1.  alpha*, v_1 = argmax alpha   s.t.  J v = alpha V,  0 <= alpha <= 1,  lo <= v <= hi
@@ -45,18 +46,13 @@ class AlphaTwoStage:
     Source: our own; stage 1 is that of [Tedrake], stage 2 the lexicographic order of [Kanoun2011].
     """
 
-    rank_tolerance: float = 1e-6
+    rank_tolerance: Annotated[float, Range(0.0)] = 1e-6
     braking: Braking = "viable"
 
     program: ClassVar[Program] = "lp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset(
         {"position", "velocity", "acceleration", "inequalities"}
     )
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        if not 0 <= self.rank_tolerance < np.inf:
-            raise DikbenchError("alpha-two-stage: rank_tolerance must be finite and at least 0")
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

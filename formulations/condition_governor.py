@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
-import numpy as np
 import pinocchio as pin
 
 from dikbench.errors import DikbenchError
 from dikbench.problem import (
     Array,
     DikProblem,
+    Drawn,
     LimitKind,
+    Parameters,
+    Range,
     Robot,
     Solve,
     least_norm,
@@ -22,7 +24,7 @@ from formulations.pseudo_inverse import scaled
 
 
 @dataclass(frozen=True)
-class ConditionGovernor:
+class ConditionGovernor(Parameters):
     """Condition-number governor: slow down towards a singularity, stop before it, leave freely.
 
         v = c J^+ V,   kappa = sigma_1/sigma_m
@@ -49,17 +51,15 @@ class ConditionGovernor:
     Source: [MoveItServo], first version.
     """
 
-    slow: float = 17.0
-    stop: float = 30.0
+    slow: Annotated[float, Range(1.0), Drawn(5.0, 30.0, log=True)] = 17.0
+    stop: Annotated[float, Range(1.0), Drawn(30.0, 200.0, log=True)] = 30.0
     after: Literal["none", "scale"] = "scale"
-    rank_tolerance: float = 1e-6
+    rank_tolerance: Annotated[float, Range(0.0)] = 1e-6
 
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        if not 1 <= self.slow < self.stop < np.inf:
-            raise DikbenchError("condition-governor: expected 1 <= slow < stop, both finite")
-        if not 0 <= self.rank_tolerance < np.inf:
-            raise DikbenchError("condition-governor: rank_tolerance must be finite and at least 0")
+    def check(self) -> None:
+        """Check that slowing down begins before approaching ends."""
+        if self.slow >= self.stop:
+            raise DikbenchError(f"slow={self.slow} must be below stop={self.stop}")
 
     @property
     def keeps(self) -> frozenset[LimitKind]:

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
-import numpy as np
-
-from dikbench.errors import DikbenchError
-from dikbench.problem import Array, DikProblem, Solve, damped_least_squares
+from dikbench.problem import (
+    Array,
+    DikProblem,
+    Drawn,
+    Parameters,
+    Range,
+    Solve,
+    damped_least_squares,
+)
 
 
 @dataclass(frozen=True)
-class DampedLeastSquares:
+class DampedLeastSquares(Parameters):
     """Damped least squares: trade tracking for speed near singularities.
 
         min ||J v - V||^2 + lambda^2 ||v||^2,   v = J^T (J J^T + lambda^2 I)^-1 V
@@ -26,12 +32,7 @@ class DampedLeastSquares:
     Source: [Wampler1986], [NakamuraHanafusa1986].
     """
 
-    damping: float = 0.05
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        if not 0 <= self.damping < np.inf:
-            raise DikbenchError("dls: damping must be finite and at least 0")
+    damping: Annotated[float, Range(0.0), Drawn(1e-3, 0.3, log=True)] = 0.05
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
-from dikbench.errors import DikbenchError
 from dikbench.problem import (
     Array,
     DikProblem,
+    Drawn,
     LimitKind,
+    Parameters,
     Program,
     QuadraticProgram,
+    Range,
     Solve,
     scaled_identity,
     sqrt_brake,
@@ -21,7 +23,7 @@ from dikbench.problem import (
 
 
 @dataclass(frozen=True)
-class DisplacementQp:
+class DisplacementQp(Parameters):
     """The program of a law that is posed in displacements Delta q = v dt, divided by dt^2.
 
         min_v  sum_i 1/2 ||Jl_i (J_i v - V_i)||^2_(W_i) + 1/2 (lambda^2 + mu_i) ||v||^2
@@ -38,21 +40,12 @@ class DisplacementQp:
         position_gain: share of the distance to a position limit per step.
     """
 
-    damping: float = 1e-6
-    lm_damping: float = 0.0
-    position_gain: float = 0.5
+    damping: Annotated[float, Range(0.0), Drawn(1e-6, 0.1, log=True)] = 1e-6
+    lm_damping: Annotated[float, Range(0.0), Drawn(1e-3, 10.0, log=True)] = 0.0
+    position_gain: Annotated[float, Range(above=0.0, high=1.0), Drawn(0.1, 1.0)] = 0.5
 
-    _law: ClassVar[str]
     program: ClassVar[Program] = "qp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        for name in ("damping", "lm_damping"):
-            if not 0 <= getattr(self, name) < np.inf:
-                raise DikbenchError(f"{self._law}: {name} must be finite and at least 0")
-        if not 0 < self.position_gain <= 1:
-            raise DikbenchError(f"{self._law}: position_gain must be above 0 and at most 1")
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

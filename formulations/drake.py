@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
-from dikbench.errors import DikbenchError
 from dikbench.problem import (
     Array,
     DikProblem,
+    Drawn,
     LimitKind,
     LinearizedJointTask,
+    Parameters,
     Program,
     QuadraticProgram,
+    Range,
     Solve,
 )
 from formulations.lu_kernel import lu_kernel
@@ -24,7 +26,7 @@ REWARD = 100.0
 
 
 @dataclass(frozen=True)
-class Drake:
+class Drake(Parameters):
     """Alpha scaling as Drake ships it: progress and joint centring weighed in one cost.
 
         min_(v, alpha)  -100 alpha + ||P (v - K e)||^2
@@ -45,15 +47,10 @@ class Drake:
     Source: [Drake], DoDifferentialInverseKinematics.
     """
 
-    centering: float = 0.0
+    centering: Annotated[float, Range(0.0, unit="1/s"), Drawn(0.0, 10.0)] = 0.0
 
     program: ClassVar[Program] = "lp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        if not 0 <= self.centering < np.inf:
-            raise DikbenchError("drake: centering must be finite and at least 0")
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 import pinocchio as pin
 
-from dikbench.errors import DikbenchError
 from dikbench.problem import (
     Array,
     DikProblem,
+    Drawn,
     LimitKind,
     Limits,
+    Parameters,
     Program,
     QuadraticProgram,
+    Range,
     Solve,
 )
 from formulations.drake import angular_first, posture_error
@@ -29,7 +31,7 @@ INFLUENCE = 0.1
 
 
 @dataclass(frozen=True)
-class DrakeSystem:
+class DrakeSystem(Parameters):
     """Least squares and joint centring, as Drake's system of 2025 poses it; no alpha.
 
         min_v  G ||J v - V||^2 + ||P (v - K e)||^2
@@ -51,18 +53,11 @@ class DrakeSystem:
     centring and joint velocity limits).
     """
 
-    tracking_weight: float = 100.0
-    centering: float = 1.0
+    tracking_weight: Annotated[float, Range(above=0.0), Drawn(1.0, 1e4, log=True)] = 100.0
+    centering: Annotated[float, Range(0.0, unit="1/s"), Drawn(0.0, 10.0)] = 1.0
 
     program: ClassVar[Program] = "qp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"velocity"})
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        if not 0 < self.tracking_weight < np.inf:
-            raise DikbenchError("drake-system: tracking_weight must be positive and finite")
-        if not 0 <= self.centering < np.inf:
-            raise DikbenchError("drake-system: centering must be finite and at least 0")
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

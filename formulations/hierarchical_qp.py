@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
-from dikbench.errors import DikbenchError, SolverFailed
+from dikbench.errors import SolverFailed
 from dikbench.problem import (
     Array,
     Box,
     Braking,
     DikProblem,
+    Drawn,
     LimitKind,
+    Parameters,
     Program,
     QuadraticProgram,
+    Range,
     Solve,
     null_space,
 )
@@ -32,7 +35,7 @@ parallel."""
 
 
 @dataclass(frozen=True)
-class HierarchicalQp:
+class HierarchicalQp(Parameters):
     """Strict priorities inside the limits: a quadratic program per priority level.
 
         level k:  min_(v, w_k)  1/2 ||w_k||^2
@@ -56,20 +59,14 @@ class HierarchicalQp:
     Source: [Kanoun2011]; [Escande2014].
     """
 
-    damping: float = 1e-3
-    rank_tolerance: float = 1e-6
+    damping: Annotated[float, Range(0.0), Drawn(1e-4, 0.1, log=True)] = 1e-3
+    rank_tolerance: Annotated[float, Range(0.0)] = 1e-6
     braking: Braking = "viable"
 
     program: ClassVar[Program] = "qp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset(
         {"position", "velocity", "acceleration", "inequalities"}
     )
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        for name in ("damping", "rank_tolerance"):
-            if not 0 <= getattr(self, name) < np.inf:
-                raise DikbenchError(f"hqp: {name} must be finite and at least 0")
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

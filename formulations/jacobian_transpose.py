@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from dikbench.errors import DikbenchError
-from dikbench.problem import Array, DikProblem, Solve
+from dikbench.problem import Array, DikProblem, Parameters, Range, Solve
 
 
 @dataclass(frozen=True)
-class JacobianTranspose:
+class JacobianTranspose(Parameters):
     """Jacobian transpose: steepest descent on the task's error, with the best step.
 
         v = a J^T V,   a = <V, J J^T V> / ||J J^T V||^2
@@ -28,12 +28,7 @@ class JacobianTranspose:
     Source: [WolovichElliott1984], [Balestrino1984]; the step is that of [Buss2004].
     """
 
-    rank_tolerance: float = 1e-6
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        if not 0 < self.rank_tolerance < np.inf:
-            raise DikbenchError("jacobian-transpose: rank_tolerance must be finite and positive")
+    rank_tolerance: Annotated[float, Range(above=0.0)] = 1e-6
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from dikbench.errors import DikbenchError
-from dikbench.problem import Array, DampedInverse, DikProblem, Limits, Projector, Solve
+from dikbench.problem import (
+    Array,
+    DampedInverse,
+    DikProblem,
+    Drawn,
+    Limits,
+    Parameters,
+    Projector,
+    Range,
+    Solve,
+)
 
 
 @dataclass(frozen=True)
-class JointCentering:
+class JointCentering(Parameters):
     """Joint centring: do the task, and draw the joints to the middle of their range meanwhile.
 
         v = J^# V + (I - J^+ J) v_2   (exact)   or   J^# V + (I - J^# J) v_2   (damped)
@@ -32,16 +42,10 @@ class JointCentering:
     Source: [Liegeois1977].
     """
 
-    gain: float = 1.0
-    damping: float = 0.0
+    gain: Annotated[float, Range(0.0, unit="1/s"), Drawn(0.1, 10.0, log=True)] = 1.0
+    damping: Annotated[float, Range(0.0), Drawn(1e-3, 0.3, log=True)] = 0.0
     projector: Projector = "exact"
-    rank_tolerance: float = 1e-6
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        for name in ("gain", "damping", "rank_tolerance"):
-            if not 0 <= getattr(self, name) < np.inf:
-                raise DikbenchError(f"joint-centering: {name} must be finite and at least 0")
+    rank_tolerance: Annotated[float, Range(0.0)] = 1e-6
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

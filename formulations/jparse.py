@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from dikbench.errors import DikbenchError
-from dikbench.problem import Array, DikProblem, Solve, thin_svd
+from dikbench.problem import Array, DikProblem, Drawn, Parameters, Range, Solve, thin_svd
 
 
 @dataclass(frozen=True)
-class JParse:
+class JParse(Parameters):
     """J-PARSE: a safe inverse of the motion, its nearly lost directions scaled down.
 
         v = sum_i g_i v_i (u_i . V),   g_i = 1/sigma_i                  if sigma_i > gamma sigma_1
@@ -30,12 +30,7 @@ class JParse:
     Source: [Guptasarma2025].
     """
 
-    threshold: float = 0.1
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        if not 0 < self.threshold < 1:
-            raise DikbenchError("jparse: threshold must be between 0 and 1")
+    threshold: Annotated[float, Range(above=0.0, below=1.0), Drawn(0.01, 0.5, log=True)] = 0.1
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

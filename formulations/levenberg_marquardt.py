@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from dikbench.errors import DikbenchError
-from dikbench.problem import Array, DikProblem, Solve, damped_least_squares
+from dikbench.problem import (
+    Array,
+    DikProblem,
+    Drawn,
+    Parameters,
+    Range,
+    Solve,
+    damped_least_squares,
+)
 
 
 @dataclass(frozen=True)
-class LevenbergMarquardt:
+class LevenbergMarquardt(Parameters):
     """Levenberg-Marquardt: damped least squares, the more damped the larger the error.
 
         v = (J^T W J + lambda^2 I)^-1 J^T W V,   lambda^2 = k E + damping^2,   E = 1/2 e^T W e
@@ -30,14 +38,8 @@ class LevenbergMarquardt:
     Source: [ChanLawrence1988], [Sugihara2011]; [Wampler1986] for the fixed damping.
     """
 
-    error_factor: float = 1.0
-    damping: float = 0.01
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        for name in ("error_factor", "damping"):
-            if not 0 <= getattr(self, name) < np.inf:
-                raise DikbenchError(f"lm: {name} must be finite and at least 0")
+    error_factor: Annotated[float, Range(0.0), Drawn(1e-2, 100.0, log=True)] = 1.0
+    damping: Annotated[float, Range(0.0), Drawn(1e-4, 0.1, log=True)] = 0.01
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

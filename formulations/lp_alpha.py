@@ -3,26 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
-from dikbench.errors import DikbenchError
 from dikbench.problem import (
     Array,
     Box,
     Braking,
     DikProblem,
+    Drawn,
     LimitKind,
     LinearizedTask,
+    Parameters,
     Program,
     QuadraticProgram,
+    Range,
     Solve,
 )
 
 
 @dataclass(frozen=True)
-class LpAlpha:
+class LpAlpha(Parameters):
     """Alpha scaling: go in the wanted direction, as fast as the limits allow.
 
         max_(v, alpha)  alpha - 1/2 rho ||v||^2
@@ -42,18 +44,13 @@ class LpAlpha:
     Source: [Tedrake], chapter 3.
     """
 
-    regularization: float | None = None
+    regularization: Annotated[float | None, Range(0.0), Drawn(1e-6, 1e-2, log=True)] = None
     braking: Braking = "viable"
 
     program: ClassVar[Program] = "lp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset(
         {"position", "velocity", "acceleration", "inequalities"}
     )
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        if self.regularization is not None and not 0 <= self.regularization < np.inf:
-            raise DikbenchError("lp-alpha: regularization must be finite and at least 0")
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 import pinocchio as pin
 
-from dikbench.errors import DikbenchError, Infeasible
+from dikbench.errors import Infeasible
 from dikbench.problem import (
     Array,
     Braking,
     DikProblem,
+    Drawn,
     LimitKind,
     LinearizedOrientation,
     LinearizedTask,
+    Parameters,
     Program,
     QuadraticProgram,
+    Range,
     Solve,
 )
 from formulations.lp_alpha import regularization_for
@@ -27,7 +30,7 @@ UPRIGHT = 1e-3
 
 
 @dataclass(frozen=True)
-class LpAlphaComponents:
+class LpAlphaComponents(Parameters):
     """Component-wise alpha scaling: each world axis as fast as the limits allow.
 
         max_(v, alpha)  sum_i alpha_i - 1/2 rho ||v||^2
@@ -50,16 +53,11 @@ class LpAlphaComponents:
     Source: [Tedrake] (the component-wise relaxation for teleoperation).
     """
 
-    regularization: float | None = None
+    regularization: Annotated[float | None, Range(0.0), Drawn(1e-6, 1e-2, log=True)] = None
     braking: Braking = "viable"
 
     program: ClassVar[Program] = "lp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        if self.regularization is not None and not 0 <= self.regularization < np.inf:
-            raise DikbenchError("lp-alpha-components: regularization must be finite and at least 0")
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

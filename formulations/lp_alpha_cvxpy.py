@@ -4,25 +4,27 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from dikbench.errors import DikbenchError
 from dikbench.problem import (
     Array,
     Braking,
     DikProblem,
+    Drawn,
     LimitKind,
     ModelledProgram,
+    Parameters,
     Program,
+    Range,
     Solve,
 )
 from formulations.lp_alpha import alpha_program, regularization_for
 
 
 @dataclass(frozen=True)
-class LpAlphaCvxpy:
+class LpAlphaCvxpy(Parameters):
     """Alpha scaling as people write it in cvxpy: the program of `lp-alpha`, word for word.
 
         maximise   alpha - 1/2 rho ||v||^2
@@ -38,16 +40,11 @@ class LpAlphaCvxpy:
     Source: [Tedrake], chapter 3; [DiamondBoyd2016].
     """
 
-    regularization: float | None = None
+    regularization: Annotated[float | None, Range(0.0), Drawn(1e-6, 1e-2, log=True)] = None
     braking: Braking = "viable"
 
     program: ClassVar[Program] = "cvxpy"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        if self.regularization is not None and not 0 <= self.regularization < np.inf:
-            raise DikbenchError("lp-alpha-cvxpy: regularization must be finite and at least 0")
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
-import numpy as np
-
-from dikbench.errors import DikbenchError
-from dikbench.problem import Array, DikProblem, Solve, damped_least_squares, volume
+from dikbench.problem import (
+    Array,
+    DikProblem,
+    Drawn,
+    Parameters,
+    Range,
+    Solve,
+    damped_least_squares,
+    volume,
+)
 
 
 @dataclass(frozen=True)
-class ManipulabilityDamping:
+class ManipulabilityDamping(Parameters):
     """Damped least squares where the manipulability is low, the pseudo-inverse elsewhere.
 
         v = J^T (J J^T + lambda^2 I)^-1 V,   w = sqrt(det(J J^T))
@@ -31,15 +38,8 @@ class ManipulabilityDamping:
     Source: [NakamuraHanafusa1986].
     """
 
-    damping: float = 0.05
-    threshold: float = 0.02
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        if not 0 <= self.damping < np.inf:
-            raise DikbenchError("dls-manipulability: damping must be finite and at least 0")
-        if not 0 < self.threshold < np.inf:
-            raise DikbenchError("dls-manipulability: threshold must be finite and positive")
+    damping: Annotated[float, Range(0.0), Drawn(1e-3, 0.3, log=True)] = 0.05
+    threshold: Annotated[float, Range(above=0.0), Drawn(2e-3, 0.1, log=True)] = 0.02
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 from formulations.displacement_qp import DisplacementQp
 
@@ -32,5 +31,3 @@ class MinkQp(DisplacementQp):
     """
 
     position_gain: float = 0.95
-
-    _law: ClassVar[str] = "mink-qp"

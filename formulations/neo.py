@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
@@ -11,10 +11,13 @@ from dikbench.errors import DikbenchError
 from dikbench.problem import (
     Array,
     DikProblem,
+    Drawn,
     LimitKind,
     Limits,
+    Parameters,
     Program,
     QuadraticProgram,
+    Range,
     Solve,
 )
 from formulations.manipulability import manipulability_gradient
@@ -27,7 +30,7 @@ SMALLEST_ERROR = 1e-6
 
 
 @dataclass(frozen=True)
-class Neo:
+class Neo(Parameters):
     """NEO's program without obstacles: a task that may give way for a better posture.
 
         min_(v, delta)  1/2 lambda_v ||v||^2 + 1/2 ||delta||^2 / ||e||_1 - k_m J_m^T v
@@ -51,25 +54,20 @@ class Neo:
     Source: [HavilandCorke2021].
     """
 
-    velocity_weight: float = 0.01
-    manipulability_gain: float = 1.0
-    damper_gain: float = 1.0
-    stop_distance: float = 0.05
-    influence_distance: float = 0.9
+    velocity_weight: Annotated[float, Range(above=0.0), Drawn(1e-3, 0.1, log=True)] = 0.01
+    manipulability_gain: Annotated[float, Range(0.0), Drawn(0.0, 3.0)] = 1.0
+    damper_gain: Annotated[float, Range(above=0.0, unit="1/s"), Drawn(0.1, 3.0, log=True)] = 1.0
+    stop_distance: Annotated[float, Range(0.0, unit="rad"), Drawn(0.01, 0.2)] = 0.05
+    influence_distance: Annotated[float, Range(above=0.0, unit="rad"), Drawn(0.3, 1.2)] = 0.9
 
     program: ClassVar[Program] = "qp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"velocity"})
 
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        if not 0 < self.velocity_weight < np.inf:
-            raise DikbenchError("neo: velocity_weight must be positive and finite")
-        if not 0 <= self.manipulability_gain < np.inf:
-            raise DikbenchError("neo: manipulability_gain must be finite and at least 0")
-        if not 0 < self.damper_gain < np.inf:
-            raise DikbenchError("neo: damper_gain must be positive and finite")
-        if not 0 <= self.stop_distance < self.influence_distance < np.inf:
-            raise DikbenchError("neo: stop_distance must be at least 0, below influence_distance")
+    def check(self) -> None:
+        """Check that joints are slowed down before they are stopped."""
+        near, far = self.stop_distance, self.influence_distance
+        if near >= far:
+            raise DikbenchError(f"stop_distance={near} must be below influence_distance={far}")
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

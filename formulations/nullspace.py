@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from dikbench.errors import DikbenchError
 from dikbench.problem import (
     Array,
     DampedInverse,
     DikProblem,
+    Drawn,
+    Parameters,
     Projector,
+    Range,
     Solve,
     scaled_identity,
 )
 
 
 @dataclass(frozen=True)
-class Nullspace:
+class Nullspace(Parameters):
     """Strict task priority: each task moves only what the tasks above it leave free.
 
         v_0 = 0,  N_0 = I,  A_k = J_k N_(k-1)
@@ -41,15 +44,9 @@ class Nullspace:
     Source: [Nakamura1987] for two tasks, [SicilianoSlotine1991] for any number.
     """
 
-    damping: float = 0.0
+    damping: Annotated[float, Range(0.0), Drawn(1e-3, 0.3, log=True)] = 0.0
     projector: Projector = "exact"
-    rank_tolerance: float = 1e-6
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        for name in ("damping", "rank_tolerance"):
-            if not 0 <= getattr(self, name) < np.inf:
-                raise DikbenchError(f"nullspace: {name} must be finite and at least 0")
+    rank_tolerance: Annotated[float, Range(0.0)] = 1e-6
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
-import numpy as np
-
-from dikbench.errors import DikbenchError
 from dikbench.problem import (
     Array,
     DampedInverse,
     DikProblem,
+    Drawn,
+    Parameters,
     Projector,
+    Range,
     Solve,
     scaled_identity,
 )
 
 
 @dataclass(frozen=True)
-class NullspaceRobust:
+class NullspaceRobust(Parameters):
     """Task priority without algorithmic singularities: invert each task alone, then project.
 
         v = sum_k N_(k-1) J_k^# V_k,   two levels:  v = J_1^# V_1 + (I - J_1^+ J_1) J_2^# V_2
@@ -40,15 +41,9 @@ class NullspaceRobust:
     [Antonelli2009].
     """
 
-    damping: float = 0.0
+    damping: Annotated[float, Range(0.0), Drawn(1e-3, 0.3, log=True)] = 0.0
     projector: Projector = "exact"
-    rank_tolerance: float = 1e-6
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        for name in ("damping", "rank_tolerance"):
-            if not 0 <= getattr(self, name) < np.inf:
-                raise DikbenchError(f"nullspace-robust: {name} must be finite and at least 0")
+    rank_tolerance: Annotated[float, Range(0.0)] = 1e-6
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

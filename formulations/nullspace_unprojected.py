@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from dikbench.errors import DikbenchError
-from dikbench.problem import Array, DikProblem, Solve, pseudo_inverse
+from dikbench.problem import Array, DikProblem, Parameters, Range, Solve, pseudo_inverse
 
 
 @dataclass(frozen=True)
-class NullspaceUnprojected:
+class NullspaceUnprojected(Parameters):
     """Correct towards each lower task in turn: does NOT protect the first task.
 
         v_1 = J_1^+ V_1,   v_k = v_(k-1) + J_k^+ (V_k - J_k v_(k-1))
@@ -30,14 +30,7 @@ class NullspaceUnprojected:
     compare [Chiaverini1997].
     """
 
-    rank_tolerance: float = 1e-6
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        if not 0 <= self.rank_tolerance < np.inf:
-            raise DikbenchError(
-                "nullspace-unprojected: rank_tolerance must be finite and at least 0"
-            )
+    rank_tolerance: Annotated[float, Range(0.0)] = 1e-6
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 from formulations.displacement_qp import DisplacementQp
 
@@ -31,5 +30,3 @@ class PinkQp(DisplacementQp):
     """
 
     position_gain: float = 0.5
-
-    _law: ClassVar[str] = "pink-qp"

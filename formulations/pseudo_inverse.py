@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
-from dikbench.errors import DikbenchError
-from dikbench.problem import Array, DikProblem, Interval, LimitKind, Solve, least_norm
+from dikbench.problem import (
+    Array,
+    DikProblem,
+    Interval,
+    LimitKind,
+    Parameters,
+    Range,
+    Solve,
+    least_norm,
+)
 
 
 @dataclass(frozen=True)
-class PseudoInverse:
+class PseudoInverse(Parameters):
     """Resolved-rate control: the least-norm velocity that does the task.
 
         v = J^+ V,   then   none:  v
@@ -31,12 +39,7 @@ class PseudoInverse:
     """
 
     after: Literal["none", "clip", "scale"] = "none"
-    rank_tolerance: float = 1e-6
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        if not 0 <= self.rank_tolerance < np.inf:
-            raise DikbenchError("pinv: rank_tolerance must be finite and at least 0")
+    rank_tolerance: Annotated[float, Range(0.0)] = 1e-6
 
     @property
     def keeps(self) -> frozenset[LimitKind]:

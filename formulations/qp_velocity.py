@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
-import numpy as np
-
-from dikbench.errors import DikbenchError
 from dikbench.problem import (
     Array,
     DikProblem,
+    Drawn,
     LimitKind,
+    Parameters,
     Program,
     QuadraticProgram,
+    Range,
     Solve,
     scaled_identity,
 )
 
 
 @dataclass(frozen=True)
-class QpVelocity:
+class QpVelocity(Parameters):
     """Least squares inside the velocity limits, the first step from the pseudo-inverse to `qp`.
 
         min_v  1/2 ||J v - V||^2 + 1/2 lambda^2 ||v||^2   s.t.   v_min <= v <= v_max
@@ -35,15 +35,10 @@ class QpVelocity:
     Source: [Tedrake] (the quadratic program with velocity constraints).
     """
 
-    damping: float = 1e-3
+    damping: Annotated[float, Range(0.0), Drawn(1e-4, 0.1, log=True)] = 1e-3
 
     program: ClassVar[Program] = "qp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"velocity"})
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        if not 0 <= self.damping < np.inf:
-            raise DikbenchError("qp-velocity: damping must be finite and at least 0")
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

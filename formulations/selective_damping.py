@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import accumulate
-from typing import Final, Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
 
-from dikbench.errors import DikbenchError
-from dikbench.problem import Array, DikProblem, Solve, rank, thin_svd
+from dikbench.problem import Array, DikProblem, Drawn, Parameters, Range, Solve, rank, thin_svd
 
 NO_RESPONSE: Final = 1e-10
 """Singular values up to this are skipped, as in the authors' code."""
 
 
 @dataclass(frozen=True)
-class SelectiveDamping:
+class SelectiveDamping(Parameters):
     """Selectively damped least squares: limit each singular direction by its own reach.
 
         phi_i   = v_i (u_i . V) / sigma_i
@@ -42,13 +41,8 @@ class SelectiveDamping:
     Source: [BussKim2005].
     """
 
-    max_rate: float = 2.0
+    max_rate: Annotated[float, Range(above=0.0, unit="rad/s"), Drawn(0.3, 6.0, log=True)] = 2.0
     clamp: Literal["hard", "soft"] = "hard"
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        if not 0 < self.max_rate < np.inf:
-            raise DikbenchError("sdls: max_rate must be finite and positive")
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-
-import numpy as np
+from typing import Annotated
 
 from dikbench.errors import DikbenchError
-from dikbench.problem import Array, DikProblem, Solve, thin_svd
+from dikbench.problem import Array, DikProblem, Drawn, Parameters, Range, Solve, thin_svd
 
 
 @dataclass(frozen=True)
-class SingularValueFiltering:
+class SingularValueFiltering(Parameters):
     """Singular value filtering: invert singular values that never get below a smallest one.
 
         v = sum_i v_i (u_i . V) / h(sigma_i)
@@ -30,15 +29,15 @@ class SingularValueFiltering:
     Source: [ColomeTorras2015].
     """
 
-    smallest: float = 0.01
-    shape: float = 10.0
+    smallest: Annotated[float, Range(above=0.0), Drawn(2e-3, 0.1, log=True)] = 0.01
+    shape: Annotated[float, Range(above=0.0), Drawn(1.0, 20.0, log=True)] = 10.0
 
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        if not 0 < self.smallest < np.inf:
-            raise DikbenchError("sv-filter: smallest must be finite and positive")
+    def check(self) -> None:
+        """Check that h rises."""
         if not self.smallest < self.shape < 2 / self.smallest:
-            raise DikbenchError("sv-filter: shape must be between smallest and 2 / smallest")
+            raise DikbenchError(
+                f"shape={self.shape} must be between smallest={self.smallest} and 2 / smallest"
+            )
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
-import numpy as np
-
-from dikbench.errors import DikbenchError
-from dikbench.problem import Array, Braking, DikProblem, LimitKind, Solve
+from dikbench.problem import Array, Braking, DikProblem, LimitKind, Parameters, Range, Solve
 from formulations.saturation import saturated_levels
 
 
 @dataclass(frozen=True)
-class SaturationInNullSpace:
+class SaturationInNullSpace(Parameters):
     """Saturation in the null space: hold joints at their bounds, let the others make up for it.
 
         v = v_N + (J W)^+ (s V - J v_N),   lo <= v <= hi   (the velocity box),   0 <= s <= 1
@@ -43,14 +40,9 @@ class SaturationInNullSpace:
     """
 
     braking: Braking = "viable"
-    rank_tolerance: float = 1e-6
+    rank_tolerance: Annotated[float, Range(0.0)] = 1e-6
 
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        if not 0 <= self.rank_tolerance < np.inf:
-            raise DikbenchError("sns: rank_tolerance must be finite and at least 0")
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

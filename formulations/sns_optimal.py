@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
-import numpy as np
-
-from dikbench.errors import DikbenchError
-from dikbench.problem import Array, Braking, DikProblem, LimitKind, Solve
+from dikbench.problem import Array, Braking, DikProblem, LimitKind, Parameters, Range, Solve
 from formulations.saturation import saturated_levels
 
 
 @dataclass(frozen=True)
-class OptimalSaturationInNullSpace:
+class OptimalSaturationInNullSpace(Parameters):
     """Optimal saturation in the null space: `sns` that lets go of joints held in vain.
 
     As `sns`, but whenever a scale s fits, the joints that are held at a bound although the motion
@@ -37,14 +34,9 @@ class OptimalSaturationInNullSpace:
     """
 
     braking: Braking = "viable"
-    rank_tolerance: float = 1e-6
+    rank_tolerance: Annotated[float, Range(0.0)] = 1e-6
 
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        if not 0 <= self.rank_tolerance < np.inf:
-            raise DikbenchError("sns-optimal: rank_tolerance must be finite and at least 0")
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from dikbench.errors import DikbenchError
-from dikbench.problem import Array, DikProblem, Solve, rank, thin_svd
+from dikbench.problem import Array, DikProblem, Drawn, Parameters, Range, Solve, rank, thin_svd
 
 
 @dataclass(frozen=True)
-class TruncatedSvd:
+class TruncatedSvd(Parameters):
     """Truncated singular value decomposition: give up the directions that are nearly lost.
 
         v = sum_i v_i (u_i . V) / sigma_i   over sigma_i > c sigma_1
@@ -26,12 +26,7 @@ class TruncatedSvd:
     Source: [Buss2004].
     """
 
-    relative_tolerance: float = 0.01
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        if not 0 <= self.relative_tolerance < 1:
-            raise DikbenchError("tsvd: relative_tolerance must be at least 0 and below 1")
+    relative_tolerance: Annotated[float, Range(0.0, below=1.0), Drawn(1e-3, 0.2, log=True)] = 0.01
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
-from dikbench.errors import DikbenchError
-from dikbench.problem import Array, DikProblem, Solve, thin_svd
+from dikbench.problem import Array, DikProblem, Drawn, Parameters, Range, Solve, thin_svd
 
 
 @dataclass(frozen=True)
-class VariableDamping:
+class VariableDamping(Parameters):
     """Variable damping: damp near a singularity only, and only the direction that is lost there.
 
         numerical:  v = J^T (J J^T + beta^2 I + lambda^2 u_m u_m^T)^-1 V
@@ -36,19 +35,11 @@ class VariableDamping:
     [Chiaverini1994] (both, and beta).
     """
 
-    damping: float = 0.05
-    threshold: float = 0.05
-    isotropic_damping: float = 0.0
+    damping: Annotated[float, Range(0.0), Drawn(1e-3, 0.3, log=True)] = 0.05
+    threshold: Annotated[float, Range(above=0.0), Drawn(0.01, 0.3, log=True)] = 0.05
+    isotropic_damping: Annotated[float, Range(0.0), Drawn(1e-4, 0.05, log=True)] = 0.0
     filtering: Literal["numerical", "isotropic"] = "numerical"
-    rank_tolerance: float = 1e-6
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        for name in ("damping", "isotropic_damping", "rank_tolerance"):
-            if not 0 <= getattr(self, name) < np.inf:
-                raise DikbenchError(f"dls-variable: {name} must be finite and at least 0")
-        if not 0 < self.threshold < np.inf:
-            raise DikbenchError("dls-variable: threshold must be finite and positive")
+    rank_tolerance: Annotated[float, Range(0.0)] = 1e-6
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

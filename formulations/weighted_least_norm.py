@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from dikbench.errors import DikbenchError
-from dikbench.problem import Array, DampedInverse, DikProblem, Solve
+from dikbench.problem import Array, DampedInverse, DikProblem, Drawn, Parameters, Range, Solve
 
 
 @dataclass(frozen=True)
-class WeightedLeastNorm:
+class WeightedLeastNorm(Parameters):
     """Weighted least norm: let those joints do the task that are not on their way to a limit.
 
         min v^T W v  s.t.  J v = V,   v = W^-1 J^T (J W^-1 J^T + lambda^2 I)^-1 V,   W = diag(w)
@@ -32,14 +32,8 @@ class WeightedLeastNorm:
     Source: [ChanDubey1995], which weighs a joint at rest too: at its limit that would lock it.
     """
 
-    damping: float = 0.0
-    rank_tolerance: float = 1e-6
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        for name in ("damping", "rank_tolerance"):
-            if not 0 <= getattr(self, name) < np.inf:
-                raise DikbenchError(f"weighted-least-norm: {name} must be finite and at least 0")
+    damping: Annotated[float, Range(0.0), Drawn(1e-3, 0.3, log=True)] = 0.0
+    rank_tolerance: Annotated[float, Range(0.0)] = 1e-6
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

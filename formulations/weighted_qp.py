@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
-import numpy as np
-
-from dikbench.errors import DikbenchError
 from dikbench.problem import (
     Array,
     Braking,
     DikProblem,
+    Drawn,
     LimitKind,
+    Parameters,
     Program,
     QuadraticProgram,
+    Range,
     Solve,
     scaled_identity,
 )
 
 
 @dataclass(frozen=True)
-class WeightedQp:
+class WeightedQp(Parameters):
     """Weighted quadratic program: all tasks at once, inside the limits.
 
         min_v  sum_i 1/2 ||J_i v - V_i||^2_(W_i) + 1/2 lambda^2 ||v||^2
@@ -43,22 +43,15 @@ class WeightedQp:
     Source: [Tedrake], chapter 3; [Pink] for the log-derivative.
     """
 
-    damping: float = 1e-3
+    damping: Annotated[float, Range(0.0), Drawn(1e-4, 0.1, log=True)] = 1e-3
     braking: Braking = "viable"
-    position_gain: float = 0.5
+    position_gain: Annotated[float, Range(above=0.0, high=1.0), Drawn(0.1, 1.0)] = 0.5
     log_derivative: bool = False
 
     program: ClassVar[Program] = "qp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset(
         {"position", "velocity", "acceleration", "inequalities"}
     )
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        if not 0 <= self.damping < np.inf:
-            raise DikbenchError("qp: damping must be finite and at least 0")
-        if not 0 < self.position_gain <= 1:
-            raise DikbenchError("qp: position_gain must be in (0, 1]")
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 from types import MappingProxyType
 from typing import Any, Literal
@@ -11,26 +11,18 @@ from typing import Any, Literal
 import numpy as np
 import pinocchio as pin
 
+from dikbench.problem import Array, Robot
 from dikbench.scenario import (
-    Array,
-    Certificate,
+    Case,
     Claim,
-    PoseTask,
+    Family,
+    Perturbation,
     Reference,
-    Scenario,
     Variation,
-    limits_in_force,
-    load_robot,
-    oracle_motion,
     placement_of,
-    positive,
-    samples,
-    secondary_tasks,
     solve_placement,
-    start_velocity,
+    usual_claims,
 )
-
-VARIATION = Variation(direction=0.2, timing=0.1)
 
 START = np.array([0.4, 0.8, 0.4])
 STOP = np.array([-0.4, 0.6, 0.6])
@@ -75,14 +67,8 @@ SET_UPS: Mapping[str, SetUp] = MappingProxyType(
 )
 
 
-def back_and_forth(
-    robot: Literal["ur3", "ur5", "ur10", "panda"] = "ur5",
-    *,
-    gain: float = 5.0,
-    dt: float = 0.005,
-    acceleration: bool = False,
-    seed: int = 0,
-) -> Scenario:
+@dataclass(frozen=True, kw_only=True)
+class BackAndForth(Family):
     """A wide sweep of position and orientation, back and forth for 10 s: pink_bench's trajectory.
 
         p = scale (start + (stop - start) sin^2 t),
@@ -97,56 +83,40 @@ def back_and_forth(
 
     Shows in: position_error_rms_m, orientation_error_rms_rad
 
-    Args:
-        robot: ur3, ur5, ur10 or panda.
-        gain: of the tracking task, 1/s.
-        dt: control period [s].
-        acceleration: whether acceleration limits are in force.
-        seed: 0 perturbs nothing.
+    Attributes:
+        robot: one of these, with its own frame.
 
     Source: pink_bench (Caron), back-and-forth trajectory.
     """
-    positive("back-and-forth", gain=gain, dt=dt)
-    where, change = SET_UPS[robot], VARIATION.drawn(seed)
-    arm = limits_in_force(load_robot(robot, where.frame), acceleration=acceleration)
-    # A bend of the path about any other axis would lead out of reach.
-    yaw = float(pin.log3(change.rotation(arm))[2])
-    reference = _path(where, yaw, change.pace)
-    q0 = solve_placement(arm, reference.placement(0.0), np.array(where.near))
-    motion = oracle_motion(arm, reference, q0, samples(reference.duration, dt))
-    least, largest = where.speed
-    points = np.array([placement_of(arm, q).translation for q in motion.q[::4]])
-    sweep = np.linalg.norm(points - points[0], axis=1).max()
-    certificate = Certificate(
-        (
+
+    robot: Literal["ur3", "ur5", "ur10", "panda"] = "ur5"
+    frame: None = None
+    dt: float = 0.005
+
+    variation = Variation(direction=0.2, timing=0.1)
+
+    def case(self, robot: Robot, change: Perturbation) -> Case:
+        """See `Family`."""
+        where = SET_UPS[self.robot]
+        arm = replace(robot, frame=where.frame)
+        # A bend of the path about any other axis would lead out of reach.
+        yaw = float(pin.log3(change.rotation(arm))[2])
+        reference = _path(where, yaw, change.pace)
+        q0 = solve_placement(arm, reference.placement(0.0), np.array(where.near))
+        motion = self.exact_motion(arm, reference, q0)
+        points = np.array([placement_of(arm, q).translation for q in motion.q[::4]])
+        sweep = np.linalg.norm(points - points[0], axis=1).max()
+        least, largest = where.speed
+        claims = (
             Claim("sweep from end to end [m]", sweep, at_least=0.83 * where.scale),
-            Claim(
-                "required speed over limit",
-                motion.speed_ratio.max(),
-                at_least=least / change.pace,
-                at_most=largest / change.pace,
+            *usual_claims(
+                motion,
+                speed=(least / change.pace, largest / change.pace),
+                sigma_min=0.9 * where.sigma_min,
+                margin=0.5,
             ),
-            Claim(
-                "smallest singular value (m, rad)",
-                motion.sigma_min.min(),
-                at_least=0.9 * where.sigma_min,
-            ),
-            Claim("position margin [rad]", motion.margin.min(), at_least=0.5),
         )
-    )
-    return Scenario(
-        robot=arm,
-        q0=q0,
-        v0=start_velocity(arm, reference, q0),
-        reference=reference,
-        tracking=PoseTask(gain=gain),
-        dt=dt,
-        duration=reference.duration,
-        certificate=certificate,
-        tasks=secondary_tasks(arm, q0),
-        motion=motion,
-        variation=VARIATION,
-    )
+        return Case(reference, q0, motion, claims, robot=arm)
 
 
 def _path(where: SetUp, yaw: float, pace: float) -> Reference:

@@ -3,48 +3,30 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from dataclasses import dataclass
 
 import numpy as np
 
 from dikbench.errors import DikbenchError
+from dikbench.problem import Array, Robot
 from dikbench.scenario import (
-    Array,
-    Certificate,
+    Case,
     Claim,
+    Family,
+    Perturbation,
     PoseFile,
-    PoseTask,
     Reference,
-    Robot,
-    Scenario,
     Variation,
-    limits_in_force,
-    load_robot,
     measure_motion,
-    positive,
     read_poses,
     samples,
-    secondary_tasks,
     solve_placement,
-    start_velocity,
     through,
 )
 
-ROBOTS = ("panda",)
-"""On which the example is certified; it takes any."""
 
-VARIATION = Variation(timing=0.1)
-
-
-def csv_poses(
-    robot: str = "panda",
-    *,
-    file: str,
-    frame: str | None = None,
-    gain: float = 5.0,
-    dt: float = 0.01,
-    acceleration: bool = False,
-    seed: int = 0,
-) -> Scenario:
+@dataclass(frozen=True, kw_only=True)
+class CsvPoses(Family):
     """Follow the target poses of a CSV file, with any robot.
 
     Columns t [s], x, y, z [m], qx, qy, qz, qw (a unit quaternion), in the world, a row per pose;
@@ -57,47 +39,32 @@ def csv_poses(
 
     Shows in: position_error_rms_m, velocity_peak_ratio, position_violation_max_rad
 
-    Args:
-        robot: a robot's name, or the path of a URDF.
+    Attributes:
         file: path of the CSV file.
-        frame: the task frame; default: the robot's.
-        gain: of the tracking task, 1/s.
-        dt: control period [s].
-        acceleration: whether acceleration limits are in force.
-        seed: 0 perturbs nothing.
 
     Source: the file's.
     """
-    positive("csv", gain=gain, dt=dt)
-    poses = read_poses(file)
-    arm = limits_in_force(load_robot(robot, frame), acceleration=acceleration)
-    pace = VARIATION.drawn(seed).pace
-    times = [pace * t for t in poses.times]
-    reference = through(times, poses.placements, smooth=False)
-    instants = samples(reference.duration, dt)
-    q = _followed(arm, reference, instants, poses, times, file)
-    motion = measure_motion(arm, instants, q)
-    certificate = Certificate(
-        (
+
+    file: str
+
+    robots = ("panda",)
+    variation = Variation(timing=0.1)
+
+    def case(self, robot: Robot, change: Perturbation) -> Case:
+        """See `Family`."""
+        poses = read_poses(self.file)
+        times = [change.pace * t for t in poses.times]
+        reference = through(times, poses.placements, smooth=False)
+        instants = samples(reference.duration, self.dt)
+        q = _followed(robot, reference, instants, poses, times, self.file)
+        motion = measure_motion(robot, instants, q)
+        claims = (
             Claim("position margin at the start [rad]", motion.margin[0], at_least=0.0),
             Claim("position margin [rad]", motion.margin.min()),
             Claim("smallest singular value (m, rad)", motion.sigma_min.min()),
             Claim("required speed over limit", motion.speed_ratio.max()),
         )
-    )
-    return Scenario(
-        robot=arm,
-        q0=q[0],
-        v0=start_velocity(arm, reference, q[0]),
-        reference=reference,
-        tracking=PoseTask(gain=gain),
-        dt=dt,
-        duration=reference.duration,
-        certificate=certificate,
-        tasks=secondary_tasks(arm, q[0]),
-        motion=motion,
-        variation=VARIATION,
-    )
+        return Case(reference, q[0], motion, claims)
 
 
 def _followed(

@@ -6,34 +6,23 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import pi
 from types import MappingProxyType
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import pinocchio as pin
 
+from dikbench.problem import Array, Drawn, PositionTask, Range, Robot
 from dikbench.scenario import (
-    Array,
-    Certificate,
+    Case,
     Claim,
-    PositionTask,
+    Family,
+    Perturbation,
     Reference,
-    Robot,
-    Scenario,
     Variation,
-    between,
-    limits_in_force,
-    load_robot,
-    oracle_motion,
     placement_of,
     plane_of,
-    positive,
-    samples,
-    secondary_tasks,
-    start_velocity,
     through,
 )
-
-VARIATION = Variation(start=0.05)
 
 RADIUS = 0.2
 
@@ -62,16 +51,8 @@ SET_UPS: Mapping[str, SetUp] = MappingProxyType(
 )
 
 
-def hexagon(
-    robot: Literal["lwr", "planar4r"] = "lwr",
-    *,
-    speed: float = 0.5,
-    laps: int = 2,
-    gain: float = 5.0,
-    dt: float = 0.001,
-    acceleration: bool = False,
-    seed: int = 0,
-) -> Scenario:
+@dataclass(frozen=True, kw_only=True)
+class Hexagon(Family):
     """The position follows a hexagon at constant speed, orientation free: a redundant arm's test.
 
     A straight line from the start to the top of a hexagon of radius 0.2 m, then round it clockwise
@@ -87,51 +68,38 @@ def hexagon(
 
     Shows in: position_violation_max_rad, velocity_violation_max_rad_s, progress_mean
 
-    Args:
-        robot: lwr or planar4r.
-        speed: along the path [m/s], 0.05 to 2.
-        laps: number of laps, 1 to 5.
-        gain: of the tracking task, 1/s.
-        dt: control period [s].
-        acceleration: whether acceleration limits are in force.
-        seed: 0 perturbs nothing.
+    Attributes:
+        robot: one of these.
+        speed: along the path.
+        laps: number of laps.
 
     Source: Flacco, De Luca & Khatib 2012, 2015.
     """
-    positive("hexagon", gain=gain, dt=dt)
-    between("hexagon", "speed", speed, 0.05, 2.0)
-    between("hexagon", "laps", laps, 1, 5)
-    arm = limits_in_force(load_robot(robot), acceleration=acceleration)
-    where, tracking = SET_UPS[robot], PositionTask(gain=gain)
-    q0 = VARIATION.drawn(seed).posture(arm, np.array(where.start))
-    reference = _path(arm, q0, np.array(where.centre), speed, laps)
-    # Close together: the least-norm motion of the LWR passes a singularity of its position.
-    instants = samples(reference.duration, dt, most=800)
-    motion = oracle_motion(arm, reference, q0, instants, tracking)
-    certificate = Certificate(
-        (
+
+    robot: Literal["lwr", "planar4r"] = "lwr"
+    frame: None = None
+    dt: float = 0.001
+    speed: Annotated[float, Range(0.05, 2.0, "m/s"), Drawn(0.2, 1.2)] = 0.5
+    laps: Annotated[int, Range(1, 5)] = 2
+
+    variation = Variation(start=0.05)
+    swept = ("speed",)
+    about_position_limits = True
+
+    def case(self, robot: Robot, change: Perturbation) -> Case:
+        """See `Family`."""
+        where, tracking = SET_UPS[self.robot], PositionTask(gain=self.gain)
+        q0 = change.posture(robot, np.array(where.start))
+        reference = _path(robot, q0, np.array(where.centre), self.speed, self.laps)
+        # Close together: the least-norm motion of the LWR passes a singularity of its position.
+        motion = self.exact_motion(robot, reference, q0, tracking, most=800)
+        fastest, required = motion.peak_speed_ratio, where.required * self.speed
+        claims = (
             Claim("position margin at the start [rad]", motion.margin[0], at_least=0.5),
             Claim("margin of the least-norm motion [rad]", motion.margin.min(), at_most=-0.05),
-            Claim(
-                "required speed over limit",
-                motion.speed_ratio.max(),
-                at_least=where.required * speed,
-            ),
+            Claim("required speed over limit", fastest, at_least=required),
         )
-    )
-    return Scenario(
-        robot=arm,
-        q0=q0,
-        v0=start_velocity(arm, reference, q0, tracking),
-        reference=reference,
-        tracking=tracking,
-        dt=dt,
-        duration=reference.duration,
-        certificate=certificate,
-        tasks=secondary_tasks(arm, q0, tracking),
-        motion=motion,
-        variation=VARIATION,
-    )
+        return Case(reference, q0, motion, claims, tracking=tracking)
 
 
 def _path(arm: Robot, q0: Array, centre: Array, speed: float, laps: int) -> Reference:

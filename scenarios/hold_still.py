@@ -6,32 +6,23 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import atan, inf, pi
 from types import MappingProxyType
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
 from dikbench.errors import DikbenchError
+from dikbench.problem import Array, Drawn, Robot
 from dikbench.scenario import (
-    Array,
-    Certificate,
+    Case,
     Claim,
-    PoseTask,
-    Robot,
-    Scenario,
+    Family,
+    Perturbation,
     Variation,
     joint_oracle,
-    limits_in_force,
-    load_robot,
     placement_of,
-    positive,
     samples,
-    secondary_tasks,
     target_at_rest,
 )
-
-Posture = Literal["start", "singular", "limit"]
-
-VARIATION = Variation(start=0.1)
 
 DURATION = 10.0
 
@@ -68,7 +59,7 @@ POSTURES: Mapping[str, Postures] = MappingProxyType(
     }
 )
 
-RANGES: Mapping[Posture, tuple[tuple[float, float], tuple[float, float]]] = MappingProxyType(
+RANGES: Mapping[str, tuple[tuple[float, float], tuple[float, float]]] = MappingProxyType(
     {
         "start": ((0.08, inf), (0.3, inf)),
         "singular": ((1e-4, 2e-3), (0.3, inf)),
@@ -78,15 +69,8 @@ RANGES: Mapping[Posture, tuple[tuple[float, float], tuple[float, float]]] = Mapp
 """Of the smallest singular value (m, rad) and of the position margin [rad], by posture."""
 
 
-def hold_still(
-    robot: Literal["panda", "ur3", "ur5", "ur10"] = "panda",
-    *,
-    posture: Posture = "start",
-    gain: float = 5.0,
-    dt: float = 0.01,
-    acceleration: bool = False,
-    seed: int = 0,
-) -> Scenario:
+@dataclass(frozen=True, kw_only=True)
+class HoldStill(Family):
     """Hold the pose of the start for 10 s: nothing should move, and what does is the law's doing.
 
     At the robot's start, or with a joint 0.003 rad from a singularity (a UR's wrist, the Panda's
@@ -99,51 +83,40 @@ def hold_still(
 
     Shows in: velocity_peak_ratio, joint_travel_rad, off_course_max_rad
 
-    Args:
-        robot: panda, ur3, ur5 or ur10.
-        posture: start, singular or limit.
-        gain: of the tracking task, 1/s.
-        dt: control period [s].
-        acceleration: whether acceleration limits are in force.
-        seed: 0 perturbs nothing.
+    Attributes:
+        robot: one of these.
+        posture: where the robot stands.
 
     Source: by construction; why damping: Wampler 1986, Nakamura & Hanafusa 1986.
     """
-    positive("hold-still", gain=gain, dt=dt)
-    arm = limits_in_force(load_robot(robot), acceleration=acceleration)
-    q0 = _posture(arm, POSTURES[robot], posture, seed)
-    motion = joint_oracle(arm, lambda tau: q0, samples(DURATION, dt, most=2))
-    sigma_min, margin = RANGES[posture]
-    certificate = Certificate(
-        (
+
+    robot: Literal["panda", "ur3", "ur5", "ur10"] = "panda"
+    frame: None = None
+    posture: Annotated[Literal["start", "singular", "limit"], Drawn()] = "start"
+
+    variation = Variation(start=0.1)
+
+    def case(self, robot: Robot, change: Perturbation) -> Case:
+        """See `Family`."""
+        q0 = self._posture(robot, change)
+        motion = joint_oracle(robot, lambda tau: q0, samples(DURATION, self.dt, most=2))
+        sigma_min, margin = RANGES[self.posture]
+        claims = (
             Claim("smallest singular value (m, rad)", motion.sigma_min.min(), *sigma_min),
             Claim("position margin [rad]", motion.margin.min(), *margin),
         )
-    )
-    return Scenario(
-        robot=arm,
-        q0=q0,
-        v0=np.zeros(arm.nv),
-        reference=target_at_rest(placement_of(arm, q0), DURATION),
-        tracking=PoseTask(gain=gain),
-        dt=dt,
-        duration=DURATION,
-        certificate=certificate,
-        tasks=secondary_tasks(arm, q0),
-        motion=motion,
-        variation=VARIATION,
-    )
+        reference = target_at_rest(placement_of(robot, q0), DURATION)
+        return Case(reference, q0, motion, claims, v0=np.zeros(robot.nv))
 
-
-def _posture(arm: Robot, where: Postures, posture: Posture, seed: int) -> Array:
-    change = VARIATION.drawn(seed)
-    if posture == "singular":
-        return change.posture(arm, np.array(where.singular), where.fixed)
-    q0 = change.posture(arm, arm.q0)
-    if posture == "limit":
-        position = arm.limits.position
-        if position is None:
-            raise DikbenchError(f"scenario hold-still: robot {arm.name} has no limits")
-        q0 = q0.copy()
-        q0[where.joint] = position.upper[where.joint] - NEAR
-    return q0
+    def _posture(self, robot: Robot, change: Perturbation) -> Array:
+        where = POSTURES[self.robot]
+        if self.posture == "singular":
+            return change.posture(robot, np.array(where.singular), where.fixed)
+        q0 = change.posture(robot, robot.q0)
+        if self.posture == "limit":
+            position = robot.limits.position
+            if position is None:
+                raise DikbenchError(f"robot {robot.name} has no limits")
+            q0 = q0.copy()
+            q0[where.joint] = position.upper[where.joint] - NEAR
+        return q0

@@ -2,36 +2,38 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any, Literal
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import pinocchio as pin
 
-from dikbench.scenario import (
-    POSTURE_WEIGHT,
+from dikbench.problem import (
     Array,
     CentreOfMassTask,
-    Certificate,
-    Claim,
+    Drawn,
     Kinematics,
-    OracleMotion,
     PoseTask,
     PostureTask,
+    Range,
     Robot,
-    Scenario,
     TrackingTogether,
+)
+from dikbench.scenario import (
+    POSTURE_WEIGHT,
+    Case,
+    Claim,
+    Family,
+    OracleMotion,
+    Perturbation,
     Variation,
-    between,
     circle,
-    load_robot,
     oracle_motion,
     placement_of,
     plane_of,
-    positive,
-    samples,
     smallest_singular_value,
-    start_velocity,
+    usual_claims,
 )
 
 FEET = ("left_sole_link", "right_sole_link")
@@ -48,19 +50,9 @@ late."""
 
 CENTRE_WEIGHT = 1e-2
 
-VARIATION = Variation(start=0.1, direction=0.2)
 
-
-def humanoid(
-    robot: Literal["talos-humanoid"] = "talos-humanoid",
-    *,
-    speed: float = 0.3,
-    radius: float = 0.1,
-    laps: float = 2.0,
-    gain: float = 5.0,
-    dt: float = 0.01,
-    seed: int = 0,
-) -> Scenario:
+@dataclass(frozen=True, kw_only=True)
+class Humanoid(Family):
     """A humanoid on both feet draws a circle with its right hand: 36 velocities, four tasks.
 
     The base is free: nothing but the two pose tasks at the feet, of the same priority as the hand's
@@ -78,61 +70,52 @@ def humanoid(
     The second tasks are the feet and the centre of mass: their errors stand together in
     `second_task_error_rms`.
 
-    Args:
-        robot: talos-humanoid.
-        speed: peak of the reference's joint motion over the limits, 0.05 to 0.9.
-        radius: of the circle [m], 0.02 to 0.15.
-        laps: number of laps, 1 to 5.
-        gain: of the tracking task and of the centre of mass, 1/s.
-        dt: control period [s].
-        seed: 0 perturbs nothing.
+    Attributes:
+        speed: peak of the reference's joint motion over the limits.
+        radius: of the circle.
+        laps: number of laps.
+        gain: of the tracking task and of the centre of mass.
 
     Source: Escande, Mansard & Wieber 2014 (humanoids as hierarchies of tasks).
     """
-    positive("humanoid", gain=gain, dt=dt)
-    between("humanoid", "speed", speed, 0.05, 0.9)
-    between("humanoid", "radius", radius, 0.02, 0.15)
-    between("humanoid", "laps", laps, 1.0, 5.0)
-    body, change = load_robot(robot), VARIATION.drawn(seed)
-    arms = [body.model.joints[k].idx_v for k, n in enumerate(body.model.names) if "arm" in n]
-    q0 = change.posture(body, body.q0, tuple(k for k in range(body.nv) if k not in arms))
-    feet = _feet(body, q0, FEET_GAIN / dt)
-    tracking = PoseTask(gain=gain)
-    start, plane = placement_of(body, q0), change.rotation(body) @ plane_of(body)
-    together = TrackingTogether(tracking, feet)
-    lap = oracle_motion(
-        body, circle(start, radius, 1.0, 1.0, plane=plane), q0, np.linspace(0, 1, 101), together
-    )
-    reference = circle(start, radius, lap.peak_speed_ratio / speed, laps, plane=plane)
-    motion = oracle_motion(body, reference, q0, samples(reference.duration, dt), together)
-    sigma, slip, room = _measured(body, motion, together)
-    certificate = Certificate(
-        (
-            Claim("number of velocities", body.nv, at_least=31),
+
+    robot: Literal["talos-humanoid"] = "talos-humanoid"
+    frame: None = None
+    acceleration: Literal[False] = False
+    speed: Annotated[float, Range(0.05, 0.9), Drawn(0.1, 0.7)] = 0.3
+    radius: Annotated[float, Range(0.02, 0.15, "m"), Drawn(0.05, 0.12)] = 0.1
+    laps: Annotated[float, Range(1.0, 5.0)] = 2.0
+
+    variation = Variation(start=0.1, direction=0.2)
+    swept = ("speed", "radius")
+
+    def case(self, robot: Robot, change: Perturbation) -> Case:
+        """See `Family`."""
+        model = robot.model
+        arms = [model.joints[k].idx_v for k, name in enumerate(model.names) if "arm" in name]
+        q0 = change.posture(robot, robot.q0, tuple(k for k in range(robot.nv) if k not in arms))
+        feet = _feet(robot, q0, FEET_GAIN / self.dt)
+        tracking = PoseTask(gain=self.gain)
+        together = TrackingTogether(tracking, feet)
+        plane = change.rotation(robot) @ plane_of(robot)
+        curve = partial(circle, placement_of(robot, q0), self.radius, plane=plane)
+        lap = oracle_motion(robot, curve(1.0, 1.0), q0, np.linspace(0, 1, 101), together)
+        reference = curve(lap.peak_speed_ratio / self.speed, self.laps)
+        motion = self.exact_motion(robot, reference, q0, together)
+        sigma, slip, room = _measured(robot, motion, together)
+        claims = (
+            Claim("number of velocities", robot.nv, at_least=31),
             Claim("smallest singular value of hand and feet (m, rad)", sigma, at_least=0.05),
             Claim("way that the feet move (m, rad)", slip, at_most=1e-8),
             Claim("room of the centre of mass above the feet [m]", room, at_least=0.03),
-            Claim("required speed over limit", motion.peak_speed_ratio, 0.9 * speed, 1.1 * speed),
-            Claim("position margin [rad]", motion.margin.min(), at_least=0.1),
+            *usual_claims(motion, speed=(0.9 * self.speed, 1.1 * self.speed), margin=0.1),
         )
-    )
-    return Scenario(
-        robot=body,
-        q0=q0,
-        v0=start_velocity(body, reference, q0, together),
-        reference=reference,
-        tracking=tracking,
-        dt=dt,
-        duration=reference.duration,
-        certificate=certificate,
-        tasks=(
-            *feet,
-            CentreOfMassTask(pin.centerOfMass(body.model, body.scratch, q0), gain, CENTRE_WEIGHT),
+        centre = pin.centerOfMass(model, robot.scratch, q0)
+        others = (
+            CentreOfMassTask(centre, self.gain, CENTRE_WEIGHT),
             PostureTask(target=q0, weight=POSTURE_WEIGHT, priority=3),
-        ),
-        motion=motion,
-        variation=VARIATION,
-    )
+        )
+        return Case(reference, q0, motion, claims, tracking=tracking, tasks=(*feet, *others))
 
 
 def _feet(body: Robot, q0: Array, gain: float) -> tuple[PoseTask, ...]:

@@ -6,31 +6,25 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import pi
 from types import MappingProxyType
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
-import pinocchio as pin
 
 from dikbench.errors import DikbenchError
+from dikbench.problem import Array, Drawn, Range, Robot
 from dikbench.scenario import (
-    Array,
-    Certificate,
+    Case,
     Claim,
-    PoseTask,
-    Scenario,
+    Family,
+    Perturbation,
     Variation,
-    between,
     joint_oracle,
     joint_path,
     least_norm_share,
-    limits_in_force,
-    load_robot,
-    positive,
     samples,
-    secondary_tasks,
+    there_and_back,
+    usual_claims,
 )
-
-VARIATION = Variation(start=0.1)
 
 
 @dataclass(frozen=True)
@@ -61,19 +55,8 @@ CROSSINGS: Mapping[str, Crossing] = MappingProxyType(
 )
 
 
-def joint_limit_crossing(
-    robot: Literal[
-        "ur5", "panda", "ur3", "ur10", "xarm7", "tiago", "talos", "lwr", "planar3r"
-    ] = "ur5",
-    *,
-    approach: float = 0.3,
-    depth: float = 0.2,
-    speed: float = 0.5,
-    gain: float = 5.0,
-    dt: float = 0.01,
-    acceleration: bool = False,
-    seed: int = 0,
-) -> Scenario:
+@dataclass(frozen=True, kw_only=True)
+class JointLimitCrossing(Family):
     """A path whose own joint motion crosses a position limit and comes back.
 
     One joint j moves as q_j(t) = q_max,j - approach + (approach + depth) sin^2(pi t/T), the others
@@ -87,65 +70,57 @@ def joint_limit_crossing(
 
     Shows in: position_violation_max_rad, off_course_max_rad
 
-    Args:
+    Attributes:
         robot: one of those above.
-        approach: how far inside the limit the motion starts [rad], 0.02 to 3.
-        depth: how far beyond the limit it goes [rad], 0.02 to 0.5.
-        speed: peak speed of the joint over its limit, 0.05 to 1.
-        gain: of the tracking task, 1/s.
-        dt: control period [s].
-        acceleration: whether acceleration limits are in force.
-        seed: 0 perturbs nothing.
+        approach: how far inside the limit the motion starts.
+        depth: how far beyond the limit it goes.
+        speed: peak speed of the joint over its limit.
 
     Source: by construction; limits as in Flacco, De Luca & Khatib 2015.
     """
-    positive("joint-limit-crossing", gain=gain, dt=dt)
-    between("joint-limit-crossing", "approach", approach, 0.02, 3.0)
-    between("joint-limit-crossing", "depth", depth, 0.02, 0.5)
-    between("joint-limit-crossing", "speed", speed, 0.05, 1.0)
-    arm = limits_in_force(load_robot(robot), acceleration=acceleration)
-    position, velocity = arm.limits.position, arm.limits.velocity
-    if position is None or velocity is None:
-        raise DikbenchError(f"scenario joint-limit-crossing: robot {robot} has no limits")
-    where = CROSSINGS[robot]
-    j = where.joint
-    start = VARIATION.drawn(seed).posture(arm, np.array(where.posture), (j,))
-    start[j] = position.upper[j] - approach
-    amplitude = approach + depth
-    duration = pi * amplitude / (speed * velocity.upper[j])
-    out = np.zeros(arm.nv)
-    out[j] = 1.0
 
-    def q_r(tau: float) -> Array:
-        q: Array = pin.integrate(
-            arm.model, start, amplitude * np.sin(pi * tau / duration) ** 2 * out
-        )
-        return q
-
-    def v_r(tau: float) -> Array:
-        v: Array = amplitude * pi / duration * np.sin(2 * pi * tau / duration) * out
-        return v
-
-    motion = joint_oracle(arm, q_r, samples(duration, dt))
-    certificate = Certificate(
-        (
-            Claim("position margin at the start [rad]", motion.margin[0], 0.9 * approach),
-            Claim("deepest margin of the motion [rad]", motion.margin.min(), at_most=-0.8 * depth),
-            Claim("smallest singular value (m, rad)", motion.sigma_min.min(), at_least=0.03),
-            Claim("its share in the least-norm motion", least_norm_share(arm, motion.q, j), 0.8),
-            Claim("required speed over limit", motion.speed_ratio.max(), 0.8 * speed, 1.05 * speed),
-        )
+    robot: Literal["ur5", "panda", "ur3", "ur10", "xarm7", "tiago", "talos", "lwr", "planar3r"] = (
+        "ur5"
     )
-    return Scenario(
-        robot=arm,
-        q0=start,
-        v0=v_r(0.0),
-        reference=joint_path(arm, q_r, v_r, duration),
-        tracking=PoseTask(gain=gain),
-        dt=dt,
-        duration=duration,
-        certificate=certificate,
-        tasks=secondary_tasks(arm, start),
-        motion=motion,
-        variation=VARIATION,
-    )
+    frame: None = None
+    approach: Annotated[float, Range(0.02, 3.0, "rad"), Drawn(0.1, 0.5)] = 0.3
+    depth: Annotated[float, Range(0.02, 0.5, "rad"), Drawn(0.05, 0.4)] = 0.2
+    speed: Annotated[float, Range(0.05, 1.0), Drawn(0.2, 0.9)] = 0.5
+
+    variation = Variation(start=0.1)
+    swept = ("depth", "speed", "approach")
+    about_position_limits = True
+
+    def case(self, robot: Robot, change: Perturbation) -> Case:
+        """See `Family`."""
+        position, velocity = robot.limits.position, robot.limits.velocity
+        if position is None or velocity is None:
+            raise DikbenchError(f"robot {self.robot} has no limits")
+        where = CROSSINGS[self.robot]
+        j = where.joint
+        start = change.posture(robot, np.array(where.posture), (j,))
+        start[j] = position.upper[j] - self.approach
+        amplitude, out = self.approach + self.depth, np.zeros(robot.nv)
+        duration = pi * amplitude / (self.speed * velocity.upper[j])
+        out[j] = 1.0
+        q_r, _ = there_and_back(robot, start, amplitude * out, duration)
+
+        def v_r(tau: float) -> Array:
+            v: Array = amplitude * pi / duration * np.sin(2 * pi * tau / duration) * out
+            return v
+
+        motion = joint_oracle(robot, q_r, samples(duration, self.dt))
+        share = least_norm_share(robot, motion.q, j)
+        claims = (
+            Claim("position margin at the start [rad]", motion.margin[0], 0.9 * self.approach),
+            Claim(
+                "deepest margin of the motion [rad]",
+                motion.margin.min(),
+                at_most=-0.8 * self.depth,
+            ),
+            *usual_claims(motion, sigma_min=0.03),
+            Claim("its share in the least-norm motion", share, 0.8),
+            *usual_claims(motion, speed=(0.8 * self.speed, 1.05 * self.speed)),
+        )
+        reference = joint_path(robot, q_r, v_r, duration)
+        return Case(reference, start, motion, claims, v0=v_r(0.0))

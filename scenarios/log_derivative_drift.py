@@ -2,42 +2,31 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import pi
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import pinocchio as pin
 
+from dikbench.errors import DikbenchError
+from dikbench.problem import Array, Drawn, PoseTask, Range, Robot
 from dikbench.scenario import (
-    Array,
-    Certificate,
+    Case,
     Claim,
-    PoseTask,
+    Family,
+    Perturbation,
     Reference,
-    Scenario,
+    Time,
     Variation,
-    between,
     joint_oracle,
-    load_robot,
     placement_of,
-    positive,
     samples,
 )
 
-VARIATION = Variation(start=0.05, direction=0.5, timing=0.1)
 
-
-def log_derivative_drift(
-    robot: Literal["base"] = "base",
-    *,
-    distance: float = 0.2,
-    turn: float = -0.9 * pi,
-    orientation_cost: float = 1e-5,
-    gain: float = 5.0,
-    dt: float = 0.01,
-    hold: float = 2.0,
-    seed: int = 0,
-) -> Scenario:
+@dataclass(frozen=True, kw_only=True)
+class LogDerivativeDrift(Family):
     """A square wave of poses for a mobile base: back by `distance`, turned by `turn`, and again.
 
     The target is the start for `hold` seconds, then `distance` behind it with a yaw of `turn`, then
@@ -52,70 +41,66 @@ def log_derivative_drift(
 
     Shows in: path_length_m
 
-    Args:
-        robot: base.
-        distance: between the two poses [m], 0.05 to 1.
-        turn: yaw between them [rad], 2 to 3 either way (not pi, where the logarithm is cut).
-        orientation_cost: beside a cost of 1 of the position, 1e-6 to 1e-3.
-        gain: of the tracking task, 1/s.
-        dt: control period [s].
-        hold: how long each pose is wanted [s].
-        seed: 0 perturbs nothing.
+    Attributes:
+        distance: between the two poses.
+        turn: yaw between them, 2 to 3 rad either way (not pi, where the logarithm is cut).
+        orientation_cost: beside a cost of 1 of the position.
+        hold: how long each pose is wanted.
 
     Source: Caron's note on the logarithm's derivative in Pink (a planar base that drifts).
     """
-    positive("log-derivative-drift", gain=gain, dt=dt, hold=hold)
-    between("log-derivative-drift", "distance", distance, 0.05, 1.0)
-    between("log-derivative-drift", "turn", abs(turn), 2.0, 3.0)
-    between("log-derivative-drift", "orientation_cost", orientation_cost, 1e-6, 1e-3)
-    base, change = load_robot(robot), VARIATION.drawn(seed)
-    period = hold * change.pace
-    q0 = change.posture(base, base.q0)
-    back = change.rotation(base) @ np.array([-distance, 0.0, 0.0])
-    first = placement_of(base, q0)
-    poses = (first, first * pin.SE3(pin.utils.rotate("z", turn), back))
 
-    def placement(tau: float) -> Any:
-        return poses[min(int(tau / period + 1e-9), 3) % 2]  # the last one stays to the end
+    robot: Literal["base"] = "base"
+    frame: None = None
+    acceleration: Literal[False] = False
+    distance: Annotated[float, Range(0.05, 1.0, "m"), Drawn(0.1, 0.5)] = 0.2
+    turn: Annotated[float, Range(-3.0, 3.0, "rad"), Drawn(-3.0, -2.2)] = -0.9 * pi
+    orientation_cost: Annotated[float, Range(1e-6, 1e-3), Drawn(1e-6, 1e-4, log=True)] = 1e-5
+    hold: Time = 2.0
 
-    zero = np.zeros(6)
-    reference = Reference(4 * period, placement, lambda tau: zero, moving=False)
+    variation = Variation(start=0.05, direction=0.5, timing=0.1)
+    swept = ("distance", "orientation_cost")
 
-    def straight(tau: float) -> Array:
-        """Each leg as a constant motion in x, y and yaw, in half of the time that it has."""
-        leg = min(int(tau / period), 3)
-        if leg == 0:
-            return q0
-        share = min(2 * (tau / period - leg), 1.0)
-        along = share if leg % 2 else 1.0 - share
-        yaw = np.arctan2(q0[3], q0[2]) + along * turn
-        x, y, _ = poses[0].act(along * back)
-        return np.array([x, y, np.cos(yaw), np.sin(yaw)])
+    def check(self) -> None:
+        """Check that the yaw is large, either way."""
+        if abs(self.turn) < 2.0:
+            raise DikbenchError(f"turn={self.turn} must be -3 to -2 or 2 to 3 [rad]")
 
-    motion = joint_oracle(base, straight, samples(4 * period, dt))
-    way = np.linalg.norm(np.diff(motion.q[:, :2], axis=0), axis=1).sum()
-    screw = pin.log6(poses[0].actInv(poses[1]))
-    certificate = Certificate(
-        (
-            Claim("length of the straight way over the distance", way / distance, 2.99, 3.01),
+    def case(self, robot: Robot, change: Perturbation) -> Case:
+        """See `Family`."""
+        period, q0 = self.hold * change.pace, change.posture(robot, robot.q0)
+        back = change.rotation(robot) @ np.array([-self.distance, 0.0, 0.0])
+        first = placement_of(robot, q0)
+        poses = (first, first * pin.SE3(pin.utils.rotate("z", self.turn), back))
+
+        def placement(tau: float) -> Any:
+            return poses[min(int(tau / period + 1e-9), 3) % 2]  # the last one stays to the end
+
+        def straight(tau: float) -> Array:
+            """Each leg as a constant motion in x, y and yaw, in half of the time that it has."""
+            leg = min(int(tau / period), 3)
+            if leg == 0:
+                return q0
+            share = min(2 * (tau / period - leg), 1.0)
+            along = share if leg % 2 else 1.0 - share
+            yaw = np.arctan2(q0[3], q0[2]) + along * self.turn
+            x, y, _ = first.act(along * back)
+            return np.array([x, y, np.cos(yaw), np.sin(yaw)])
+
+        motion = joint_oracle(robot, straight, samples(4 * period, self.dt))
+        way = np.linalg.norm(np.diff(motion.q[:, :2], axis=0), axis=1).sum() / self.distance
+        screw = pin.log6(first.actInv(poses[1]))
+        weight, detour = self.orientation_cost**2, _length(screw) / self.distance
+        claims = (
+            Claim("length of the straight way over the distance", way, 2.99, 3.01),
             # The detour that the screw makes is what damping widens.
-            Claim("length of the screw over the distance", _length(screw) / distance, 1.15),
+            Claim("length of the screw over the distance", detour, 1.15),
             Claim("yaw between the poses [rad]", abs(screw.angular[2]), at_most=3.05),
-            Claim("weight of the orientation", orientation_cost**2, at_most=1.01e-6),
+            Claim("weight of the orientation", weight, at_most=1.01e-6),
         )
-    )
-    return Scenario(
-        robot=base,
-        q0=q0,
-        v0=np.zeros(3),
-        reference=reference,
-        tracking=PoseTask(gain=gain, weight=np.array([1.0, 1.0, orientation_cost**2])),
-        dt=dt,
-        duration=4 * period,
-        certificate=certificate,
-        motion=motion,
-        variation=VARIATION,
-    )
+        tracking, zero = PoseTask(gain=self.gain, weight=np.array([1.0, 1.0, weight])), np.zeros(6)
+        reference = Reference(4 * period, placement, lambda tau: zero, moving=False)
+        return Case(reference, q0, motion, claims, tracking=tracking, v0=np.zeros(3))
 
 
 def _length(screw: pin.Motion) -> float:

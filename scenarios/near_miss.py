@@ -3,47 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from dikbench.errors import DikbenchError
+from dikbench.problem import Array, Drawn, Range, Robot
 from dikbench.scenario import (
-    Array,
+    Case,
     Certificate,
     Claim,
+    Family,
     Kind,
     OracleMotion,
     Perturbation,
-    PoseTask,
     Reference,
-    Robot,
-    Scenario,
     Singularity,
     Variation,
     analyse,
-    between,
+    at_constant_rate,
     joint_oracle,
-    limits_in_force,
-    load_robot,
     make_singular,
     oracle_motion,
     placement_of,
-    positive,
     screw_path,
-    secondary_tasks,
     singular_postures,
     solve_placement,
-    start_velocity,
 )
 from scenarios.singular_postures import SINGULAR_POSTURES, SingularityName, SingularPosture
-
-ROBOTS = tuple(SINGULAR_POSTURES)
-"""Of which singular postures are known by name; it takes any."""
-
-VARIATION = Variation(start=0.1, timing=0.1)
 
 MARGIN = 0.05
 """Least distance of the motion to a position limit [rad]: it is not about limits."""
@@ -53,6 +43,10 @@ HALF_LENGTHS: Mapping[Kind, tuple[float, ...]] = MappingProxyType(
 )
 """Half lengths of the path that are tried where none is known (see `SingularPosture`)."""
 
+CROSSED = Range(0.001, 0.2, "m; rad", also=(0.0,))
+TOUCHED = Range(0.002, 0.05, "m; rad")
+"""How near a path may pass a crossing, and a fold or a saddle."""
+
 LEAST_GROWTH = 0.01
 """Of the smallest singular value (m, rad) per rad of the joint that leads out."""
 
@@ -60,18 +54,16 @@ SAMPLES = 100
 """Of the motion on each side of the nearest point."""
 
 
-def near_miss(
-    robot: str = "ur5",
-    *,
-    frame: str | None = None,
-    singularity: Literal["auto", "wrist", "elbow", "shoulder"] = "auto",
-    miss: float = 0.02,
-    speed: float = 0.5,
-    gain: float = 5.0,
-    dt: float = 0.005,
-    acceleration: bool = False,
-    seed: int = 0,
-) -> Scenario:
+class _Passage(NamedTuple):
+    """A path past a singularity, the motion that follows it, and what it claims."""
+
+    reference: Reference
+    motion: OracleMotion
+    claims: tuple[Claim, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class NearMiss(Family):
     """A path that passes a singularity at the distance `miss` and the speed `speed`.
 
     At the singular posture q_s, X_s the placement, J = U S V^T the body Jacobian (m, rad), n = u_m
@@ -88,62 +80,44 @@ def near_miss(
 
     Shows in: velocity_peak_ratio, off_course_max_rad, progress_min
 
-    Args:
-        robot: a robot's name, or the path of a URDF.
-        frame: its task frame; default: the robot's.
+    Attributes:
         singularity: wrist, elbow or shoulder, where the robot's are known; auto: the first of those
             that are known, else the first one that is found from the robot's start outwards.
-        miss: length of the unit body twist n by which the path misses [m; rad]: 0 or 0.001 to 0.2
-            (crossing), 0.002 to 0.05 (fold, saddle).
-        speed: ds/dt [rad/s] of the joint (crossing), or along the unit twist n, mostly a
-            translation [m/s] (fold, saddle); 0.02 to 3.
-        gain: of the tracking task, 1/s.
-        dt: control period [s].
-        acceleration: whether acceleration limits are in force.
-        seed: 0 perturbs nothing.
+        miss: length of the unit body twist n by which the path misses; at a fold or a saddle 0.002
+            to 0.05.
+        speed: ds/dt, of the joint (crossing), or along the unit twist n, mostly a translation
+            (fold, saddle).
 
     Source: Nakamura & Hanafusa 1986; Chiaverini, Siciliano & Egeland 1994.
     """
-    positive("near-miss", gain=gain, dt=dt)
-    between("near-miss", "speed", speed, 0.02, 3.0)
-    arm = limits_in_force(load_robot(robot, frame), acceleration=acceleration)
-    change = VARIATION.drawn(seed)
-    pace = speed / change.pace
-    if arm.nv < len(arm.task_rows):
-        raise DikbenchError(
-            f"scenario near-miss: robot {arm.name} has {arm.nv} joints, a pose has "
-            f"{len(arm.task_rows)} rows: it is singular everywhere"
-        )
-    if singularity == "auto" and robot not in SINGULAR_POSTURES:
-        passage = _first_found(arm, miss, pace, change)
-    else:
-        known = _known(robot, singularity)
-        seeded = pin.integrate(arm.model, pin.neutral(arm.model), np.array(known.posture))
-        where = _perturbed(arm, make_singular(arm, seeded), change)
-        passage = _passage(arm, where, miss, pace, known.half_length)
-    reference, motion = passage.reference, passage.motion
-    q0 = motion.q[0]
-    return Scenario(
-        robot=arm,
-        q0=q0,
-        v0=start_velocity(arm, reference, q0),
-        reference=reference,
-        tracking=PoseTask(gain=gain),
-        dt=dt,
-        duration=reference.duration,
-        certificate=passage.certificate,
-        tasks=secondary_tasks(arm, q0),
-        motion=motion,
-        variation=VARIATION,
-    )
 
+    robot: str = "ur5"
+    dt: float = 0.005
+    singularity: Annotated[Literal["auto", "wrist", "elbow", "shoulder"], Drawn()] = "auto"
+    miss: Annotated[float, CROSSED, Drawn(0.002, 0.05, log=True)] = 0.02
+    speed: Annotated[float, Range(0.02, 3.0, "rad/s; m/s"), Drawn(0.1, 1.5, log=True)] = 0.5
 
-class _Passage(NamedTuple):
-    """A path past a singularity, the motion that follows it, and what it claims."""
+    robots = tuple(SINGULAR_POSTURES)
+    variation = Variation(start=0.1, timing=0.1)
+    swept = ("miss", "speed")
+    grid = ("miss", "speed")
 
-    reference: Reference
-    motion: OracleMotion
-    certificate: Certificate
+    def case(self, robot: Robot, change: Perturbation) -> Case:
+        """See `Family`."""
+        if robot.nv < len(robot.task_rows):
+            raise DikbenchError(
+                f"robot {robot.name} has {robot.nv} joints, a pose has {len(robot.task_rows)} "
+                "rows: it is singular everywhere"
+            )
+        pace = self.speed / change.pace
+        if self.singularity == "auto" and self.robot not in SINGULAR_POSTURES:
+            passage = _first_found(robot, self.miss, pace, change)
+        else:
+            known = _known(self.robot, self.singularity)
+            seeded = pin.integrate(robot.model, pin.neutral(robot.model), np.array(known.posture))
+            where = _perturbed(robot, make_singular(robot, seeded), change)
+            passage = _passage(robot, where, self.miss, pace, known.half_length)
+        return Case(passage.reference, passage.motion.q[0], passage.motion, passage.claims)
 
 
 def _known(robot: str, singularity: SingularityName | Literal["auto"]) -> SingularPosture:
@@ -154,8 +128,7 @@ def _known(robot: str, singularity: SingularityName | Literal["auto"]) -> Singul
     if singularity not in postures:
         valid = ", ".join(["auto", *postures])
         raise DikbenchError(
-            f"scenario near-miss: no {singularity} of robot {robot} is known; "
-            f"valid: singularity={valid}"
+            f"no {singularity} of robot {robot} is known; valid: singularity={valid}"
         )
     return postures[singularity]
 
@@ -179,13 +152,13 @@ def _first_found(arm: Robot, miss: float, speed: float, change: Perturbation) ->
         for half_length in HALF_LENGTHS[where.kind]:
             try:
                 passage = _passage(arm, where, miss, speed, half_length)
-                passage.certificate.check("near-miss")
+                Certificate(passage.claims).check()
             except DikbenchError as error:
                 reason = str(error)
                 continue
             return passage
     raise DikbenchError(
-        f"scenario near-miss: no singular posture of robot {arm.name} (frame {arm.frame}) can be "
+        f"no singular posture of robot {arm.name} (frame {arm.frame}) can be "
         f"passed with miss={miss}, speed={speed:.3g}; the last one tried: {reason}"
     )
 
@@ -194,11 +167,10 @@ def _passage(
     arm: Robot, where: Singularity, miss: float, speed: float, half_length: float
 ) -> _Passage:
     """The first way past a singularity that can be followed inside the position limits."""
-    if where.kind != "crossing" or miss != 0:
-        low, high = (0.001, 0.2) if where.kind == "crossing" else (0.002, 0.05)
-        between("near-miss", "miss", miss, low, high)
+    if where.kind != "crossing":
+        TOUCHED.check("miss", miss)
     if where.kind == "crossing" and where.growth.max() < LEAST_GROWTH:
-        raise DikbenchError("scenario near-miss: no single joint leads out of the singularity")
+        raise DikbenchError("no single joint leads out of the singularity")
     if where.kind == "crossing" and miss == 0:
         return _straight_through(arm, where, speed, half_length)
     ways = _crossings if where.kind == "crossing" else _folds
@@ -212,24 +184,20 @@ def _passage(
         except DikbenchError as error:
             reason = str(error)
             continue
-        found.append(_Passage(reference, motion, _certificate(arm, where, miss, speed, motion)))
+        found.append(_Passage(reference, motion, _claims(arm, where, miss, speed, motion)))
         if motion.margin.min() >= MARGIN:
             return found[-1]
     if not found:
-        raise DikbenchError(f"scenario near-miss: the path cannot be followed: {reason}")
+        raise DikbenchError(f"the path cannot be followed: {reason}")
     return max(found, key=lambda passage: float(passage.motion.margin.min()))
 
 
 def _straight_through(arm: Robot, where: Singularity, speed: float, half_length: float) -> _Passage:
     """The motion of the single joint that leads out fastest, from one side to the other."""
     reference, start = next(_crossings(arm, where, 0.0, speed, half_length))
-    out = _way_out(where)
-    motion = joint_oracle(
-        arm,
-        lambda tau: pin.integrate(arm.model, start, speed * tau * out),
-        _instants(half_length, 0.0, reference.duration),
-    )
-    return _Passage(reference, motion, _certificate(arm, where, 0.0, speed, motion))
+    q_r, _ = at_constant_rate(arm, start, speed * _way_out(where))
+    motion = joint_oracle(arm, q_r, _instants(half_length, 0.0, reference.duration))
+    return _Passage(reference, motion, _claims(arm, where, 0.0, speed, motion))
 
 
 def _way_out(where: Singularity) -> Array:
@@ -282,9 +250,9 @@ def _instants(half_length: float, miss: float, duration: float) -> Array:
     return instants
 
 
-def _certificate(
+def _claims(
     arm: Robot, where: Singularity, miss: float, speed: float, motion: OracleMotion
-) -> Certificate:
+) -> tuple[Claim, ...]:
     sigma, limit = motion.sigma_min, arm.limits.velocity
     peak, middle = float(np.abs(motion.v).max()), motion.instants[SAMPLES]
     aside = abs(motion.instants[np.argmin(sigma)] - middle) / middle
@@ -309,7 +277,7 @@ def _certificate(
     claims.append(Claim("distance from the singular placement (m, rad)", apart, at_most=0.21))
     if limit is not None:
         claims.append(Claim("required speed over limit", motion.peak_speed_ratio))
-    return Certificate(tuple(claims))
+    return tuple(claims)
 
 
 def _distance_from(where: Singularity, q: Array, arm: Robot) -> float:

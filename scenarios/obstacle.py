@@ -5,41 +5,30 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import pinocchio as pin
 
 from dikbench.errors import DikbenchError
+from dikbench.problem import Array, CollisionConstraint, Drawn, Kinematics, Range, Robot, null_space
 from dikbench.scenario import (
-    Array,
     BoxObstacle,
     CapsuleObstacle,
-    Certificate,
+    Case,
     Claim,
-    CollisionConstraint,
-    Kinematics,
+    Family,
     Obstacle,
-    PoseTask,
+    Perturbation,
     Reference,
-    Robot,
-    Scenario,
     SphereObstacle,
     Variation,
-    between,
+    collision_claims,
     duration_at,
     influence_distance,
     joint_path,
-    limits_in_force,
-    load_robot,
     measure_motion,
-    null_space,
-    oracle_motion,
-    positive,
-    samples,
-    secondary_tasks,
     solve_placement,
-    start_velocity,
 )
 
 Where = Literal["hand", "elbow"]
@@ -85,21 +74,9 @@ POLE = 0.3
 MARGIN = 0.01
 """Distance to keep [m]."""
 
-VARIATION = Variation(start=0.03, timing=0.1)
 
-
-def obstacle(
-    robot: Literal["panda", "ur3", "ur5", "ur10", "xarm7", "lwr"] = "panda",
-    *,
-    where: Literal["hand", "elbow"] = "hand",
-    shape: Literal["sphere", "capsule", "box"] = "sphere",
-    depth: float = 0.03,
-    speed: float = 0.3,
-    gain: float = 5.0,
-    dt: float = 0.01,
-    acceleration: bool = False,
-    seed: int = 0,
-) -> Scenario:
+@dataclass(frozen=True, kw_only=True)
+class ObstacleInTheWay(Family):
     """A path whose own joint motion runs into an obstacle: the hand gives way, or the elbow does.
 
     One joint swings past the middle posture and the task frame is asked to follow,
@@ -119,74 +96,63 @@ def obstacle(
 
     Shows in: distance_min_m, distance_violation_max_m, position_error_max_m
 
-    Args:
+    Attributes:
         robot: one of those above; lwr for the elbow only, ur3, ur5 and ur10 for the hand only.
-        where: what the obstacle is in the way of, hand or elbow.
-        shape: sphere, capsule or box.
-        depth: how far inside the obstacle the reference's motion goes [m], 0.01 to 0.05.
-        speed: peak of the motion's joint speeds over their limits, 0.05 to 0.9.
-        gain: of the tracking task, 1/s.
-        dt: control period [s].
-        acceleration: whether acceleration limits are in force.
-        seed: 0 perturbs nothing.
+        where: what the obstacle is in the way of.
+        shape: of the obstacle.
+        depth: how far inside the obstacle the reference's motion goes.
+        speed: peak of the motion's joint speeds over their limits.
 
     Source: Faverjon & Tournassoud 1987 (obstacles near a manipulator); Maciejewski & Klein 1985
     (the null space of a redundant arm keeps it clear).
     """
-    positive("obstacle", gain=gain, dt=dt)
-    between("obstacle", "depth", depth, 0.01, 0.05)
-    between("obstacle", "speed", speed, 0.05, 0.9)
-    if robot not in SWINGS[where]:
-        raise DikbenchError(
-            f"scenario obstacle: robot={robot} with where={where}; valid: "
-            + ", ".join(SWINGS[where])
+
+    robot: Literal["panda", "ur3", "ur5", "ur10", "xarm7", "lwr"] = "panda"
+    frame: None = None
+    where: Annotated[Where, Drawn()] = "hand"
+    shape: Annotated[Shape, Drawn()] = "sphere"
+    depth: Annotated[float, Range(0.01, 0.05, "m"), Drawn(0.015, 0.04)] = 0.03
+    speed: Annotated[float, Range(0.05, 0.9), Drawn(0.1, 0.6)] = 0.3
+
+    variation = Variation(start=0.03, timing=0.1)
+    swept = ("depth", "speed")
+
+    def check(self) -> None:
+        """Check that the robot swings past an obstacle there."""
+        if self.robot not in SWINGS[self.where]:
+            valid = ", ".join(SWINGS[self.where])
+            raise DikbenchError(f"robot={self.robot} with where={self.where}; valid: {valid}")
+
+    def case(self, robot: Robot, change: Perturbation) -> Case:
+        """See `Family`."""
+        swing = SWINGS[self.where][self.robot]
+        middle = robot.q0 if swing.middle is None else np.array(swing.middle)
+        middle = change.posture(robot, middle)
+        q0, at_one_second = _swing(robot, middle, swing, 1.0)
+        duration = duration_at(robot, at_one_second, q0, self.speed) * change.pace
+        _, reference = _swing(robot, middle, swing, duration)
+        motion = self.exact_motion(robot, reference, q0, most=100)
+        half_way = motion.q[len(motion.q) // 2]
+        constraint = replace(
+            _in_the_way(robot, half_way, swing.joint, self.where, self.shape, self.depth),
+            influence=influence_distance(acceleration=self.acceleration),
         )
-    arm = limits_in_force(load_robot(robot), acceleration=acceleration)
-    swing, change = SWINGS[where][robot], VARIATION.drawn(seed)
-    middle = change.posture(arm, arm.q0 if swing.middle is None else np.array(swing.middle))
-    q0, at_one_second = _swing(arm, middle, swing, 1.0)
-    duration = duration_at(arm, at_one_second, q0, speed) * change.pace
-    _, reference = _swing(arm, middle, swing, duration)
-    motion = oracle_motion(arm, reference, q0, samples(duration, dt, most=100))
-    half_way = motion.q[len(motion.q) // 2]
-    influence = influence_distance(acceleration=acceleration)
-    constraint = replace(
-        _in_the_way(arm, half_way, swing.joint, where, shape, depth), influence=influence
-    )
-    distance = constraint.distances(arm, motion.q)
-    claims = [
-        Claim("least distance of the reference's motion [m]", distance.min(), -0.1, -0.8 * depth),
-        Claim("distance at the start [m]", distance[0], at_least=1.5 * MARGIN),
-        Claim("distance at the end [m]", distance[-1], at_least=1.5 * MARGIN),
-        Claim("smallest singular value (m, rad)", motion.sigma_min.min(), at_least=0.04),
-        Claim("position margin [rad]", motion.margin.min(), at_least=0.1),
-        Claim("required speed over limit", motion.peak_speed_ratio, 0.8 * speed, 1.2 * speed),
-    ]
-    if where == "hand":
-        carried = _distance_of_hand(arm, half_way, constraint)
-        claims.append(Claim("distance of the hand on its path [m]", carried, -0.1, -0.8 * depth))
-    else:
-        q = _clear_motion(arm, reference, motion.instants, q0, constraint)
-        other, clear = measure_motion(arm, motion.instants, q), constraint.distances(arm, q)
-        claims += [
-            Claim("least distance of another motion that does it [m]", clear.min(), MARGIN),
-            Claim("position margin of that motion [rad]", other.margin.min(), at_least=0.05),
-            Claim("required speed of that motion over limit", other.peak_speed_ratio, at_most=1.0),
-        ]
-    return Scenario(
-        robot=arm,
-        q0=q0,
-        v0=start_velocity(arm, reference, q0),
-        reference=reference,
-        tracking=PoseTask(gain=gain),
-        dt=dt,
-        duration=duration,
-        certificate=Certificate(tuple(claims)),
-        tasks=secondary_tasks(arm, q0),
-        motion=motion,
-        variation=VARIATION,
-        constraints=(constraint,),
-    )
+        distance, depth = constraint.distances(robot, motion.q), 0.8 * self.depth
+        claims = collision_claims(motion, distance, MARGIN, depth=depth, speed=self.speed)
+        if self.where == "hand":
+            carried = _distance_of_hand(robot, half_way, constraint)
+            claims += (Claim("distance of the hand on its path [m]", carried, -0.1, -depth),)
+        else:
+            q = _clear_motion(robot, reference, motion.instants, q0, constraint)
+            clear = constraint.distances(robot, q).min()
+            other = measure_motion(robot, motion.instants, q)
+            margin, fastest = other.margin.min(), other.peak_speed_ratio
+            claims += (
+                Claim("least distance of another motion that does it [m]", clear, MARGIN),
+                Claim("position margin of that motion [rad]", margin, at_least=0.05),
+                Claim("required speed of that motion over limit", fastest, at_most=1.0),
+            )
+        return Case(reference, q0, motion, claims, constraints=(constraint,))
 
 
 def _swing(arm: Robot, middle: Array, swing: Swing, duration: float) -> tuple[Array, Reference]:

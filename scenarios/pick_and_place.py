@@ -2,55 +2,32 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
 import pinocchio as pin
 
-from dikbench.errors import DikbenchError
+from dikbench.problem import Array, Drawn, Range, Robot
 from dikbench.scenario import (
-    Array,
-    Certificate,
-    Claim,
-    PoseTask,
+    Case,
+    Family,
+    Perturbation,
     Reference,
-    Scenario,
     Variation,
-    between,
+    check_can_lift,
     duration_at,
-    limits_in_force,
-    load_robot,
-    oracle_motion,
     placement_of,
-    positive,
-    samples,
-    secondary_tasks,
-    start_velocity,
     through,
+    usual_claims,
 )
-
-ROBOTS = ("panda", "ur3", "ur5", "ur10", "xarm7", "kinova", "tiago")
-"""On which its defaults are certified; it takes any that is not planar."""
-
-VARIATION = Variation(start=0.05, direction=0.2)
 
 SHARES = (0.2, 0.1, 0.05, 0.1, 0.3, 0.1, 0.05, 0.1)
 """Of the duration: approach, down, grasp (a dwell), lift, carry, down, release (a dwell), up."""
 
 
-def pick_and_place(
-    robot: str = "panda",
-    *,
-    frame: str | None = None,
-    width: float = 0.3,
-    height: float = 0.1,
-    turn: float = 0.8,
-    speed: float = 0.8,
-    gain: float = 5.0,
-    dt: float = 0.01,
-    acceleration: bool = False,
-    seed: int = 0,
-) -> Scenario:
+@dataclass(frozen=True, kw_only=True)
+class PickAndPlace(Family):
     """Pick something up on one side and place it, turned, on the other; the best case in practice.
 
     From the start to above the object, `width`/2 to the side at the same height; `height` down to
@@ -63,79 +40,51 @@ def pick_and_place(
 
     Shows in: position_error_max_m, orientation_error_max_rad, velocity_violation_max_rad_s
 
-    Args:
-        robot: a robot's name, or the path of a URDF.
-        frame: its task frame; default: the robot's.
-        width: from the object to its place [m], 0.1 to 0.4.
-        height: by which it is lifted [m], 0.02 to 0.15.
-        turn: of the object about the vertical [rad], 0 to 1.5.
-        speed: peak of the reference's joint motion over the limits, 0.1 to 3.
-        gain: of the tracking task, 1/s.
-        dt: control period [s].
-        acceleration: whether acceleration limits are in force.
-        seed: 0 perturbs nothing.
+    Attributes:
+        width: from the object to its place.
+        height: by which it is lifted.
+        turn: of the object about the vertical.
+        speed: peak of the reference's joint motion over the limits.
 
     Source: Tedrake, Robotic Manipulation (basic pick and place); least jerk: Flash & Hogan 1985.
     """
-    positive("pick-and-place", gain=gain, dt=dt)
-    between("pick-and-place", "width", width, 0.1, 0.4)
-    between("pick-and-place", "height", height, 0.02, 0.15)
-    between("pick-and-place", "turn", turn, 0.0, 1.5)
-    between("pick-and-place", "speed", speed, 0.1, 3.0)
-    arm = limits_in_force(load_robot(robot, frame), acceleration=acceleration)
-    if 2 not in arm.task_rows:
-        raise DikbenchError(
-            f"scenario pick-and-place: robot {arm.name} moves in a plane and cannot lift; "
-            f"valid: {', '.join(ROBOTS)}, a URDF"
-        )
-    change = VARIATION.drawn(seed)
-    q0 = change.posture(arm, arm.q0)
-    places = _places(placement_of(arm, q0), change.rotation(arm), width, height, turn)
-    duration = duration_at(arm, _path(places, 1.0), q0, speed)
-    reference = _path(places, duration)
-    motion = oracle_motion(arm, reference, q0, samples(duration, dt))
-    certificate = Certificate(
-        (
-            Claim(
-                "required speed over limit",
-                motion.speed_ratio.max(),
-                at_least=0.95 * speed,
-                at_most=1.05 * speed,
-            ),
-            Claim("smallest singular value (m, rad)", motion.sigma_min.min(), at_least=0.03),
-            Claim("position margin [rad]", motion.margin.min(), at_least=0.1),
-        )
-    )
-    return Scenario(
-        robot=arm,
-        q0=q0,
-        v0=start_velocity(arm, reference, q0),
-        reference=reference,
-        tracking=PoseTask(gain=gain),
-        dt=dt,
-        duration=duration,
-        certificate=certificate,
-        tasks=secondary_tasks(arm, q0),
-        motion=motion,
-        variation=VARIATION,
-    )
 
+    width: Annotated[float, Range(0.1, 0.4, "m"), Drawn(0.15, 0.35)] = 0.3
+    height: Annotated[float, Range(0.02, 0.15, "m"), Drawn(0.05, 0.12)] = 0.1
+    turn: Annotated[float, Range(0.0, 1.5, "rad"), Drawn(0.0, 1.0)] = 0.8
+    speed: Annotated[float, Range(0.1, 3.0), Drawn(0.3, 1.2, log=True)] = 0.8
 
-def _places(start: Any, rotation: Array, width: float, height: float, turn: float) -> list[Any]:
-    """The placements between the legs, nine of them."""
-    x, y, _ = start.translation
-    across = rotation @ np.array([-y, x, 0.0])  # at a right angle to the arm
-    across *= width / 2 / np.hypot(across[0], across[1])
-    across[2] = 0.0
-    down = np.array([0.0, 0.0, -height])
+    robots = ("panda", "ur3", "ur5", "ur10", "xarm7", "kinova", "tiago")
+    variation = Variation(start=0.05, direction=0.2)
+    swept = ("speed", "width", "height", "turn")
 
-    def at(side: float, lowered: Array) -> Any:
-        yaw = pin.utils.rotate("z", side * turn / 2)
-        return pin.SE3(yaw @ start.rotation, start.translation + side * across + lowered)
+    def case(self, robot: Robot, change: Perturbation) -> Case:
+        """See `Family`."""
+        check_can_lift(robot, self.robots)
+        q0 = change.posture(robot, robot.q0)
+        places = self._places(placement_of(robot, q0), change.rotation(robot))
+        duration = duration_at(robot, _path(places, 1.0), q0, self.speed)
+        reference = _path(places, duration)
+        motion = self.exact_motion(robot, reference, q0)
+        speed = (0.95 * self.speed, 1.05 * self.speed)
+        claims = usual_claims(motion, speed=speed, sigma_min=0.03, margin=0.1)
+        return Case(reference, q0, motion, claims)
 
-    above, below = at(-1, 0 * down), at(-1, down)
-    above_place, place = at(1, 0 * down), at(1, down)
-    return [start, above, below, below, above, above_place, place, place, above_place]
+    def _places(self, start: Any, rotation: Array) -> list[Any]:
+        """The placements between the legs, nine of them."""
+        x, y, _ = start.translation
+        across = rotation @ np.array([-y, x, 0.0])  # at a right angle to the arm
+        across *= self.width / 2 / np.hypot(across[0], across[1])
+        across[2] = 0.0
+        down = np.array([0.0, 0.0, -self.height])
+
+        def at(side: float, lowered: Array) -> Any:
+            yaw = pin.utils.rotate("z", side * self.turn / 2)
+            return pin.SE3(yaw @ start.rotation, start.translation + side * across + lowered)
+
+        above, below = at(-1, 0 * down), at(-1, down)
+        above_place, place = at(1, 0 * down), at(1, down)
+        return [start, above, below, below, above, above_place, place, place, above_place]
 
 
 def _path(places: list[Any], duration: float) -> Reference:

@@ -2,47 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import pi
+from typing import Annotated
 
 import numpy as np
 import pinocchio as pin
 
+from dikbench.problem import Drawn, Range, Robot
 from dikbench.scenario import (
-    Certificate,
-    Claim,
-    PoseTask,
-    Reference,
-    Scenario,
+    Case,
+    Family,
+    Perturbation,
+    Time,
     Variation,
-    between,
-    limits_in_force,
-    load_robot,
-    oracle_motion,
+    motion_of_a_step,
     placement_of,
-    positive,
-    secondary_tasks,
-    start_velocity,
+    step_claims,
     target_at_rest,
+    usual_claims,
 )
 
-ROBOTS = ("panda", "ur3", "ur5", "ur10", "xarm7", "talos", "planar3r", "planar4r")
-"""On which its defaults are certified; it takes any."""
 
-VARIATION = Variation(start=0.1, direction=pi)
-
-
-def reach(
-    robot: str = "panda",
-    *,
-    frame: str | None = None,
-    distance: float = 0.1,
-    angle: float = 0.3,
-    gain: float = 2.0,
-    dt: float = 0.01,
-    duration: float = 2.5,
-    acceleration: bool = False,
-    seed: int = 0,
-) -> Scenario:
+@dataclass(frozen=True, kw_only=True)
+class Reach(Family):
     """A step to a target nearby: the easy case.
 
     The target is `distance` [m] and `angle` [rad] away from the start, along the body axis
@@ -53,57 +36,33 @@ def reach(
 
     Shows in: position_error_final_m, orientation_error_final_rad
 
-    Args:
-        robot: a robot's name, or the path of a URDF.
-        frame: its task frame; default: the robot's.
-        distance: of the target [m], 0.01 to 0.3.
-        angle: of the target [rad], 0 to 1.5.
-        gain: of the tracking task, 1/s.
-        dt: control period [s].
-        duration: [s].
-        acceleration: whether acceleration limits are in force.
-        seed: 0 perturbs nothing.
+    Attributes:
+        distance: of the target.
+        angle: of the target.
+        duration: of the run.
 
     Source: step response; every controller's first test.
     """
-    positive("reach", gain=gain, dt=dt, duration=duration)
-    between("reach", "distance", distance, 0.01, 0.3)
-    between("reach", "angle", angle, 0.0, 1.5)
-    arm = limits_in_force(load_robot(robot, frame), acceleration=acceleration)
-    change = VARIATION.drawn(seed)
-    q0 = change.posture(arm, arm.q0)
-    start = placement_of(arm, q0)
-    axis = change.rotation(arm) @ np.array([-1.0, 1.0, -1.0])
-    twist = np.zeros(6)
-    rows = list(arm.task_rows)
-    twist[rows] = np.concatenate([axis, axis])[rows]  # only what the arm can move
-    twist[:3] *= distance / np.linalg.norm(twist[:3])
-    twist[3:] *= angle / np.linalg.norm(twist[3:])
-    target = start * pin.exp6(pin.Motion(twist))
-    # The motion that a gain asks for: straight there, at first at gain times the distance.
-    straight = Reference(
-        1 / gain,
-        lambda tau: start * pin.exp6(pin.Motion(gain * tau * twist)),
-        lambda tau: gain * twist,
-    )
-    motion = oracle_motion(arm, straight, q0, np.linspace(0.0, straight.duration, 51))
-    reference = target_at_rest(target, duration)
-    certificate = Certificate(
-        (
-            Claim("smallest singular value on the way", motion.sigma_min.min(), at_least=0.03),
-            Claim("position margin on the way [rad]", motion.margin.min(), at_least=0.05),
-            Claim("required speed over limit", motion.speed_ratio.max(), at_most=0.9),
-        )
-    )
-    return Scenario(
-        robot=arm,
-        q0=q0,
-        v0=start_velocity(arm, reference, q0),
-        reference=reference,
-        tracking=PoseTask(gain=gain),
-        dt=dt,
-        duration=duration,
-        certificate=certificate,
-        tasks=secondary_tasks(arm, q0),
-        variation=VARIATION,
-    )
+
+    gain: float = 2.0
+    distance: Annotated[float, Range(0.01, 0.3, "m"), Drawn(0.02, 0.15)] = 0.1
+    angle: Annotated[float, Range(0.0, 1.5, "rad"), Drawn(0.05, 0.5)] = 0.3
+    duration: Time = 2.5
+
+    robots = ("panda", "ur3", "ur5", "ur10", "xarm7", "talos", "planar3r", "planar4r")
+    variation = Variation(start=0.1, direction=pi)
+    swept = ("distance", "angle")
+
+    def case(self, robot: Robot, change: Perturbation) -> Case:
+        """See `Family`."""
+        q0 = change.posture(robot, robot.q0)
+        axis = change.rotation(robot) @ np.array([-1.0, 1.0, -1.0])
+        twist = np.zeros(6)
+        rows = list(robot.task_rows)
+        twist[rows] = np.concatenate([axis, axis])[rows]  # only what the arm can move
+        twist[:3] *= self.distance / np.linalg.norm(twist[:3])
+        twist[3:] *= self.angle / np.linalg.norm(twist[3:])
+        target = placement_of(robot, q0) * pin.exp6(pin.Motion(twist))
+        way = motion_of_a_step(robot, q0, twist, self.gain)
+        claims = (*step_claims(way), *usual_claims(way, speed=(-np.inf, 0.9)))
+        return Case(target_at_rest(target, self.duration), q0, None, claims)

@@ -3,31 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import pinocchio as pin
 
+from dikbench.problem import Drawn, Range, Robot
 from dikbench.scenario import (
-    Certificate,
+    Case,
     Claim,
-    PoseTask,
-    Reference,
-    Scenario,
+    Family,
+    Perturbation,
+    Time,
     Variation,
-    between,
-    limits_in_force,
-    load_robot,
-    oracle_motion,
+    motion_of_a_step,
     placement_of,
-    positive,
-    secondary_tasks,
-    start_velocity,
+    step_claims,
     target_at_rest,
 )
-
-VARIATION = Variation(start=0.1, direction=0.2)
 
 DIRECTIONS: Mapping[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = MappingProxyType(
     {
@@ -44,21 +39,12 @@ DIRECTIONS: Mapping[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = Ma
 """Where the target lies and about what it is turned, in the axes of the task frame at the start:
 a way on which the arm meets neither a limit nor a singularity."""
 
-LEAST = 0.1
+LEAST_FIRST_SPEED = 0.1
 """First speed over the limits, per gain [1/s] and angle [rad], that a step asks for at least."""
 
 
-def step(
-    robot: Literal["panda", "ur3", "ur5", "ur10", "xarm7", "kinova", "tiago", "talos"] = "panda",
-    *,
-    distance: float = 0.2,
-    angle: float = 1.5,
-    gain: float = 5.0,
-    dt: float = 0.01,
-    duration: float = 4.0,
-    acceleration: bool = False,
-    seed: int = 0,
-) -> Scenario:
+@dataclass(frozen=True, kw_only=True)
+class Step(Family):
     """A step to a target far away and far turned: the first commands ask for too much.
 
     X_d = (R exp3(angle a), p + distance R d), from the first instant on, with a and d unit vectors
@@ -70,55 +56,35 @@ def step(
 
     Shows in: off_course_max_rad, velocity_violation_max_rad_s, progress_min
 
-    Args:
+    Attributes:
         robot: one of the arms in space.
-        distance: of the target [m], 0.05 to 0.3.
-        angle: of the target [rad], 0.5 to 2.62 (30 to 150 deg).
-        gain: of the tracking task, 1/s.
-        dt: control period [s].
-        duration: [s].
-        acceleration: whether acceleration limits are in force.
-        seed: 0 perturbs nothing.
+        distance: of the target.
+        angle: of the target.
+        duration: of the run.
 
     Source: step response; the screw: Lynch & Park, Modern Robotics, 2017.
     """
-    positive("step", gain=gain, dt=dt, duration=duration)
-    between("step", "distance", distance, 0.05, 0.3)
-    between("step", "angle", angle, 0.5, 2.62)
-    arm = limits_in_force(load_robot(robot), acceleration=acceleration)
-    change = VARIATION.drawn(seed)
-    q0 = change.posture(arm, arm.q0)
-    start = placement_of(arm, q0)
-    d, a = (
-        change.rotation(arm) @ (np.array(direction) / np.linalg.norm(direction))
-        for direction in DIRECTIONS[robot]
-    )
-    target = pin.SE3(
-        start.rotation @ pin.exp3(angle * a), start.translation + distance * start.rotation @ d
-    )
-    twist = pin.log6(start.actInv(target))
-    # The motion that a gain asks for: straight there, at first at gain times the distance.
-    straight = Reference(
-        1 / gain, lambda tau: start * pin.exp6(gain * tau * twist), lambda tau: gain * twist.np
-    )
-    motion = oracle_motion(arm, straight, q0, np.linspace(0.0, straight.duration, 51))
-    reference = target_at_rest(target, duration)
-    certificate = Certificate(
-        (
-            Claim("smallest singular value on the way", motion.sigma_min.min(), at_least=0.03),
-            Claim("position margin on the way [rad]", motion.margin.min(), at_least=0.05),
-            Claim("first speed over limit", motion.speed_ratio[0], at_least=LEAST * gain * angle),
+
+    robot: Literal["panda", "ur3", "ur5", "ur10", "xarm7", "kinova", "tiago", "talos"] = "panda"
+    frame: None = None
+    distance: Annotated[float, Range(0.05, 0.3, "m"), Drawn(0.1, 0.25)] = 0.2
+    angle: Annotated[float, Range(0.5, 2.62, "rad"), Drawn(1.0, 2.0)] = 1.5
+    duration: Time = 4.0
+
+    variation = Variation(start=0.1, direction=0.2)
+    swept = ("distance", "angle")
+
+    def case(self, robot: Robot, change: Perturbation) -> Case:
+        """See `Family`."""
+        q0 = change.posture(robot, robot.q0)
+        start = placement_of(robot, q0)
+        d, a = (
+            change.rotation(robot) @ (np.array(direction) / np.linalg.norm(direction))
+            for direction in DIRECTIONS[self.robot]
         )
-    )
-    return Scenario(
-        robot=arm,
-        q0=q0,
-        v0=start_velocity(arm, reference, q0),
-        reference=reference,
-        tracking=PoseTask(gain=gain),
-        dt=dt,
-        duration=duration,
-        certificate=certificate,
-        tasks=secondary_tasks(arm, q0),
-        variation=VARIATION,
-    )
+        away = start.translation + self.distance * start.rotation @ d
+        target = pin.SE3(start.rotation @ pin.exp3(self.angle * a), away)
+        way = motion_of_a_step(robot, q0, pin.log6(start.actInv(target)).np, self.gain)
+        least = LEAST_FIRST_SPEED * self.gain * self.angle
+        claims = (*step_claims(way), Claim("first speed over limit", way.speed_ratio[0], least))
+        return Case(target_at_rest(target, self.duration), q0, None, claims)

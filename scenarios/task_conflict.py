@@ -6,31 +6,35 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import pi
 from types import MappingProxyType
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import pinocchio as pin
 
-from dikbench.scenario import (
+from dikbench.problem import (
     Array,
-    Certificate,
-    Claim,
+    Drawn,
     Kinematics,
     PoseTask,
     PositionTask,
+    Range,
     Robot,
-    Scenario,
     TrackingTask,
-    Variation,
-    between,
     damped_least_squares,
+    null_space,
+)
+from dikbench.scenario import (
+    Case,
+    Claim,
+    Family,
+    Gain,
+    Perturbation,
+    Variation,
     joint_oracle,
     joint_path,
-    limits_in_force,
-    load_robot,
-    null_space,
-    positive,
     samples,
+    there_and_back,
+    usual_claims,
 )
 
 
@@ -72,22 +76,12 @@ CONFLICTS: Mapping[str, Conflict] = MappingProxyType(
     }
 )
 
-VARIATION = Variation(start=0.05, timing=0.1)
-
 SELF_MOTION = 50
 """Steps towards the elbow's target that the arm makes about a hand at rest."""
 
 
-def task_conflict(
-    robot: Literal["planar4r", "planar3r", "panda"] = "planar4r",
-    *,
-    speed: float = 0.3,
-    gain: float = 5.0,
-    second_gain: float = 2.0,
-    dt: float = 0.01,
-    acceleration: bool = False,
-    seed: int = 0,
-) -> Scenario:
+@dataclass(frozen=True, kw_only=True)
+class TaskConflict(Family):
     """A hand that moves on, and an elbow that is wanted elsewhere: priorities are put to the test.
 
     The joints move as q(t) = q_a + (q_b - q_a) sin^2(pi t/T) and the hand is asked to follow, with
@@ -101,68 +95,59 @@ def task_conflict(
 
     Shows in: position_error_max_m, second_task_error_rms, velocity_peak_ratio
 
-    Args:
-        robot: planar4r, planar3r or panda.
-        speed: peak of the motion's own speed over the velocity limits, 0.05 to 0.9.
-        gain: of the tracking task, 1/s.
-        second_gain: of the elbow's task, 1/s.
-        dt: control period [s].
-        acceleration: whether acceleration limits are in force.
-        seed: 0 perturbs nothing.
+    Attributes:
+        robot: one of these.
+        speed: peak of the motion's own speed over the velocity limits.
+        second_gain: of the elbow's task.
 
     Source: Chiaverini 1997 (algorithmic singularities).
     """
-    positive("task-conflict", gain=gain, second_gain=second_gain, dt=dt)
-    between("task-conflict", "speed", speed, 0.05, 0.9)
-    arm = limits_in_force(load_robot(robot), acceleration=acceleration)
-    where, change = CONFLICTS[robot], VARIATION.drawn(seed)
-    middle = np.array(where.middle)
-    start = change.posture(arm, np.array(where.start))
-    way = middle - start
-    assert arm.limits.velocity is not None
-    # The rate of sin^2(pi t/T) peaks at pi/T.
-    duration = pi * float((np.abs(way) / arm.limits.velocity.upper).max()) / speed * change.pace
 
-    def q_r(tau: float) -> Array:
-        q: Array = pin.integrate(arm.model, start, np.sin(pi * tau / duration) ** 2 * way)
-        return q
+    robot: Literal["planar4r", "planar3r", "panda"] = "planar4r"
+    frame: None = None
+    speed: Annotated[float, Range(0.05, 0.9), Drawn(0.1, 0.7)] = 0.3
+    second_gain: Gain = 2.0
 
-    def v_r(tau: float) -> Array:
-        v: Array = pi / duration * np.sin(2 * pi * tau / duration) * way
-        return v
+    variation = Variation(start=0.05, timing=0.1)
+    swept = ("speed",)
 
-    tracking: TrackingTask = PoseTask(gain=gain) if where.whole_pose else PositionTask(gain=gain)
-    kinematics = Kinematics(arm)
-    kinematics.update(start)
-    elbow = kinematics.placement(arm.model.getFrameId(where.elbow)).translation
-    second = PositionTask(
-        target=elbow + np.array(where.offset), gain=second_gain, frame=where.elbow, priority=2
-    )
-    motion = joint_oracle(arm, q_r, samples(duration, dt), tracking)
-    free, alone, apart = _conflict(arm, motion.q[len(motion.q) // 2], tracking, second)
-    certificate = Certificate(
-        (
+    def case(self, robot: Robot, change: Perturbation) -> Case:
+        """See `Family`."""
+        where = CONFLICTS[self.robot]
+        start = change.posture(robot, np.array(where.start))
+        way = np.array(where.middle) - start
+        assert robot.limits.velocity is not None
+        # The rate of sin^2(pi t/T) peaks at pi/T.
+        fastest = float((np.abs(way) / robot.limits.velocity.upper).max())
+        duration = pi * fastest / self.speed * change.pace
+        q_r, v_r = there_and_back(robot, start, way, duration)
+        task = PoseTask if where.whole_pose else PositionTask
+        tracking: TrackingTask = task(gain=self.gain)
+        kinematics = Kinematics(robot)
+        kinematics.update(start)
+        elbow = kinematics.placement(robot.model.getFrameId(where.elbow)).translation
+        target = elbow + np.array(where.offset)
+        second = PositionTask(target=target, gain=self.second_gain, frame=where.elbow, priority=2)
+        motion = joint_oracle(robot, q_r, samples(duration, self.dt), tracking)
+        free, alone, apart = _conflict(robot, motion.q[len(motion.q) // 2], tracking, second)
+        speed = (0.8 * self.speed, 1.2 * self.speed)
+        claims = (
             Claim("smallest singular value of J_2 N_1 half way (m)", free, at_most=1e-3),
             Claim("smallest singular value of J_2 itself (m)", alone, at_least=0.01),
             Claim("least error of the elbow, the hand on its way [m]", apart, at_least=0.02),
             Claim("smallest singular value of the hand's task", motion.sigma_min.min(), 0.02),
-            Claim("position margin [rad]", motion.margin.min(), at_least=0.05),
-            Claim("required speed over limit", motion.peak_speed_ratio, 0.8 * speed, 1.2 * speed),
+            *usual_claims(motion, margin=0.05),
+            *usual_claims(motion, speed=speed),
         )
-    )
-    return Scenario(
-        robot=arm,
-        q0=start,
-        v0=v_r(0.0),
-        reference=joint_path(arm, q_r, v_r, duration),
-        tracking=tracking,
-        dt=dt,
-        duration=duration,
-        certificate=certificate,
-        tasks=(second,),
-        motion=motion,
-        variation=VARIATION,
-    )
+        return Case(
+            joint_path(robot, q_r, v_r, duration),
+            start,
+            motion,
+            claims,
+            tracking=tracking,
+            v0=v_r(0.0),
+            tasks=(second,),
+        )
 
 
 def _conflict(

@@ -2,52 +2,33 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Annotated
+
 import numpy as np
 import pinocchio as pin
 
 from dikbench.errors import DikbenchError
+from dikbench.problem import Array, Drawn, Range, Robot, TorqueConstraint
 from dikbench.scenario import (
-    Array,
-    Certificate,
+    Case,
     Claim,
+    Family,
     OracleMotion,
-    PoseTask,
-    Robot,
-    Scenario,
-    TorqueConstraint,
+    Perturbation,
     Variation,
-    between,
+    check_can_lift,
     effort_limits,
-    limits_in_force,
-    load_robot,
     oracle_motion,
     placement_of,
-    positive,
-    samples,
-    secondary_tasks,
     through,
+    usual_claims,
     with_payload,
 )
 
-ROBOTS = ("panda", "ur3", "ur5", "ur10", "xarm7", "tiago")
-"""On which its defaults are certified; it takes any that is not planar and has effort limits."""
 
-VARIATION = Variation(start=0.05, direction=0.2)
-
-
-def torque_limited(
-    robot: str = "panda",
-    *,
-    frame: str | None = None,
-    height: float = 0.08,
-    load: float = 0.85,
-    demand: float = 1.15,
-    dwell: float = 0.5,
-    gain: float = 5.0,
-    dt: float = 0.01,
-    acceleration: bool = False,
-    seed: int = 0,
-) -> Scenario:
+@dataclass(frozen=True, kw_only=True)
+class TorqueLimited(Family):
     """A payload that is lifted and lowered faster than the joints' torques allow, and held between.
 
     Straight up by `height`, orientation fixed, from rest to rest in the way of least jerk; a dwell;
@@ -62,71 +43,52 @@ def torque_limited(
 
     Shows in: torque_usage_max, torque_violating_share, position_error_max_m, infeasible_share
 
-    Args:
-        robot: a robot's name, or the path of a URDF.
-        frame: its task frame; default: the robot's.
-        height: of the lift [m], 0.02 to 0.3.
-        load: largest torque that it takes to hold the payload over the limits, 0.3 to 0.9.
-        demand: largest torque of the reference's joint motion over the limits, 1.12 to 2.
-        dwell: how long it is held at either end [s], 0.1 to 5.
-        gain: of the tracking task, 1/s.
-        dt: control period [s].
-        acceleration: whether acceleration limits are in force.
-        seed: 0 perturbs nothing.
+    Attributes:
+        height: of the lift.
+        load: largest torque that it takes to hold the payload over the limits.
+        demand: largest torque of the reference's joint motion over the limits.
+        dwell: how long it is held at either end.
 
     Source: least jerk: Flash & Hogan 1985; torques: Featherstone 2008 (recursive Newton-Euler).
     """
-    positive("torque-limited", gain=gain, dt=dt)
-    between("torque-limited", "height", height, 0.02, 0.3)
-    between("torque-limited", "load", load, 0.3, 0.9)
-    between("torque-limited", "demand", demand, 1.12, 2.0)
-    between("torque-limited", "dwell", dwell, 0.1, 5.0)
-    arm = limits_in_force(load_robot(robot, frame), acceleration=acceleration)
-    arm = arm.with_limits(effort=arm.available_effort)
-    effort_limits(arm)  # there are some
-    if 2 not in arm.task_rows:
-        raise DikbenchError(
-            f"scenario torque-limited: robot {arm.name} moves in a plane and cannot lift; "
-            f"valid: {', '.join(ROBOTS)}, a URDF"
-        )
-    change = VARIATION.drawn(seed)
-    q0 = change.posture(arm, arm.q0)
-    bottom = placement_of(arm, q0)
-    up = change.rotation(arm) @ np.array([0.0, 0.0, height])
-    places = [bottom, pin.SE3(bottom.rotation, bottom.translation + up)]
-    rise = oracle_motion(arm, through([0.0, 1.0], places, smooth=True), q0, np.linspace(0, 1, 201))
-    mass = _heaviest(arm, rise.q, load)
-    arm = with_payload(arm, mass)
-    time = _shortest(arm, rise, demand)
-    there_and_back = [places[k] for k in (0, 1, 1, 0, 0)]
-    times = np.cumsum([0.0, time, dwell, time, dwell]).tolist()
-    reference = through(times, there_and_back, smooth=True)
-    motion = oracle_motion(arm, reference, q0, samples(reference.duration, dt, most=1000))
-    moving, held = _usage(arm, _torques(arm, motion)), _usage(arm, _gravity(arm, motion.q))
-    certificate = Certificate(
-        (
-            Claim("torque of the motion over limit", moving, 1.1, 1.05 * demand),
-            Claim("torque to hold it over limit", held, 0.95 * load, 1.01 * load),
+
+    height: Annotated[float, Range(0.02, 0.3, "m"), Drawn(0.05, 0.1)] = 0.08
+    load: Annotated[float, Range(0.3, 0.9), Drawn(0.7, 0.9)] = 0.85
+    demand: Annotated[float, Range(1.12, 2.0), Drawn(1.12, 1.4)] = 1.15
+    dwell: Annotated[float, Range(0.1, 5.0, "s"), Drawn(0.2, 1.0)] = 0.5
+
+    robots = ("panda", "ur3", "ur5", "ur10", "xarm7", "tiago")
+    variation = Variation(start=0.05, direction=0.2)
+    swept = ("demand", "load", "height")
+
+    def case(self, robot: Robot, change: Perturbation) -> Case:
+        """See `Family`."""
+        arm = robot.with_limits(effort=robot.available_effort)
+        effort_limits(arm)  # there are some
+        check_can_lift(arm, self.robots)
+        q0 = change.posture(arm, arm.q0)
+        bottom = placement_of(arm, q0)
+        up = change.rotation(arm) @ np.array([0.0, 0.0, self.height])
+        places = [bottom, pin.SE3(bottom.rotation, bottom.translation + up)]
+        lift = through([0.0, 1.0], places, smooth=True)
+        rise = oracle_motion(arm, lift, q0, np.linspace(0, 1, 201))
+        mass = _heaviest(arm, rise.q, self.load)
+        arm = with_payload(arm, mass)
+        time = _shortest(arm, rise, self.demand)
+        times = np.cumsum([0.0, time, self.dwell, time, self.dwell]).tolist()
+        reference = through(times, [places[k] for k in (0, 1, 1, 0, 0)], smooth=True)
+        motion = self.exact_motion(arm, reference, q0, most=1000)
+        moving, held = _usage(arm, _torques(arm, motion)), _usage(arm, _gravity(arm, motion.q))
+        claims = (
+            Claim("torque of the motion over limit", moving, 1.1, 1.05 * self.demand),
+            Claim("torque to hold it over limit", held, 0.95 * self.load, 1.01 * self.load),
             Claim("payload [kg]", mass, at_least=0.1),
-            Claim("required speed over limit", motion.peak_speed_ratio, at_most=1.0),
-            Claim("smallest singular value (m, rad)", motion.sigma_min.min(), at_least=0.03),
-            Claim("position margin [rad]", motion.margin.min(), at_least=0.1),
+            *usual_claims(motion, speed=(-np.inf, 1.0), sigma_min=0.03, margin=0.1),
         )
-    )
-    return Scenario(
-        robot=arm,
-        q0=q0,
-        v0=np.zeros(arm.nv),
-        reference=reference,
-        tracking=PoseTask(gain=gain),
-        dt=dt,
-        duration=reference.duration,
-        certificate=certificate,
-        tasks=secondary_tasks(arm, q0),
-        motion=motion,
-        variation=VARIATION,
-        constraints=(TorqueConstraint(),),
-    )
+        constraints = (TorqueConstraint(),)
+        return Case(
+            reference, q0, motion, claims, arm, v0=np.zeros(arm.nv), constraints=constraints
+        )
 
 
 def _gravity(arm: Robot, q: Array) -> Array:
@@ -155,7 +117,7 @@ def _heaviest(arm: Robot, q: Array, load: float) -> float:
     empty = _gravity(arm, q)
     if (used := _usage(arm, empty)) >= load:
         raise DikbenchError(
-            f"scenario torque-limited: robot {arm.name} takes {used:.2f} of its effort limits to "
+            f"robot {arm.name} takes {used:.2f} of its effort limits to "
             f"hold itself; load={load} must be above that"
         )
     return _first_at(arm, load, empty, _gravity(with_payload(arm, 1.0), q) - empty)

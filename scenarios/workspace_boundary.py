@@ -3,39 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from math import pi
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import pinocchio as pin
 
 from dikbench.errors import DikbenchError
+from dikbench.problem import Array, Drawn, Range, Robot
 from dikbench.scenario import (
-    Array,
-    Certificate,
+    Case,
     Claim,
+    Family,
     OracleMotion,
-    PoseTask,
+    Perturbation,
     Reference,
-    Robot,
-    Scenario,
     Variation,
-    between,
-    limits_in_force,
-    load_robot,
     measure_motion,
     placement_of,
-    positive,
-    secondary_tasks,
     solve_placement,
-    start_velocity,
     target_at_rest,
 )
-
-ROBOTS = ("panda", "ur3", "ur5", "ur10", "xarm7", "kinova", "tiago", "planar3r", "planar4r")
-"""On which its defaults are certified; it takes any."""
-
-VARIATION = Variation(start=0.1)
 
 STRIDE = 0.02
 """Step [m] by which the line is followed; halved where it leads too far."""
@@ -47,18 +36,8 @@ FARTHEST_STEP = 0.6
 """A solution that is further away than this [rad] belongs to another branch."""
 
 
-def workspace_boundary(
-    robot: str = "panda",
-    *,
-    frame: str | None = None,
-    path: Literal["out-and-back", "still"] = "out-and-back",
-    extent: float = 1.1,
-    speed: float = 0.3,
-    gain: float = 5.0,
-    dt: float = 0.01,
-    acceleration: bool = False,
-    seed: int = 0,
-) -> Scenario:
+@dataclass(frozen=True, kw_only=True)
+class WorkspaceBoundary(Family):
     """A straight line from the start to `extent` times the reach and back, orientation held.
 
     On the ray from the first joint's origin o through the start, at the distance r_0:
@@ -71,63 +50,52 @@ def workspace_boundary(
 
     Shows in: sigma_min, velocity_peak_ratio, stuck_share
 
-    Args:
-        robot: a robot's name, or the path of a URDF.
-        frame: its task frame; default: the robot's.
-        path: out-and-back or still.
-        extent: farthest point over the reach along the ray, 1 to 1.5.
-        speed: peak speed along the line [m/s], 0.05 to 2.
-        gain: of the tracking task, 1/s.
-        dt: control period [s].
-        acceleration: whether acceleration limits are in force.
-        seed: 0 perturbs nothing.
+    Attributes:
+        path: out and back, or at rest at the farthest point.
+        extent: farthest point over the reach along the ray.
+        speed: peak speed along the line.
 
     Source: Chiaverini, Siciliano & Egeland 1994 (the arm stretched at the boundary).
     """
-    positive("workspace-boundary", gain=gain, dt=dt)
-    between("workspace-boundary", "extent", extent, 1.0, 1.5)
-    between("workspace-boundary", "speed", speed, 0.05, 2.0)
-    arm = limits_in_force(load_robot(robot, frame), acceleration=acceleration)
-    q0 = VARIATION.drawn(seed).posture(arm, arm.q0)
-    start = placement_of(arm, q0)
-    origin = arm.model.jointPlacements[1].translation
-    ray = start.translation - origin
-    first = float(np.linalg.norm(ray))
-    ray /= first
 
-    def at(distance: float) -> Any:
-        return pin.SE3(start.rotation, origin + distance * ray)
+    path: Annotated[Literal["out-and-back", "still"], Drawn()] = "out-and-back"
+    extent: Annotated[float, Range(1.0, 1.5), Drawn(1.0, 1.4)] = 1.1
+    speed: Annotated[float, Range(0.05, 2.0, "m/s"), Drawn(0.1, 1.0, log=True)] = 0.3
 
-    motion = _as_far_as_it_goes(arm, at, first, q0)
-    reach = float(motion.reach[-1])
-    farthest = extent * reach
-    if path == "still":
-        reference = target_at_rest(at(farthest), 20 / gain)
-    else:
-        reference = _out_and_back(at, start.rotation.T @ ray, first, farthest - first, speed)
-    asked = arm.reach_of(reference.placement(reference.duration / 2))
-    sigma = motion.sigma_min
-    certificate = Certificate(
-        (
+    robots = ("panda", "ur3", "ur5", "ur10", "xarm7", "kinova", "tiago", "planar3r", "planar4r")
+    variation = Variation(start=0.1)
+    swept = ("extent", "speed")
+
+    def case(self, robot: Robot, change: Perturbation) -> Case:
+        """See `Family`."""
+        q0 = change.posture(robot, robot.q0)
+        start = placement_of(robot, q0)
+        origin = robot.model.jointPlacements[1].translation
+        ray = start.translation - origin
+        first = float(np.linalg.norm(ray))
+        ray /= first
+
+        def at(distance: float) -> Any:
+            return pin.SE3(start.rotation, origin + distance * ray)
+
+        motion = _as_far_as_it_goes(robot, at, first, q0)
+        reach = float(motion.reach[-1])
+        farthest = self.extent * reach
+        if self.path == "still":
+            reference = target_at_rest(at(farthest), 20 / self.gain)
+        else:
+            along, way = start.rotation.T @ ray, farthest - first
+            reference = _out_and_back(at, along, first, way, self.speed)
+        asked = robot.reach_of(reference.placement(reference.duration / 2))
+        sigma = motion.sigma_min
+        claims = (
             Claim("reach along the line [m]", reach, at_least=1.05 * first),
             Claim("farthest target over the reach", asked / reach, at_least=1 - 1e-9),
             Claim("singular value at the boundary (m, rad)", sigma[-1], at_most=0.02),
             Claim("its ratio to the one at the start", sigma[-1] / sigma[0], at_most=0.1),
             Claim("position margin up to there [rad]", motion.margin.min(), at_least=0.02),
         )
-    )
-    return Scenario(
-        robot=arm,
-        q0=q0,
-        v0=start_velocity(arm, reference, q0),
-        reference=reference,
-        tracking=PoseTask(gain=gain),
-        dt=dt,
-        duration=reference.duration,
-        certificate=certificate,
-        tasks=secondary_tasks(arm, q0),
-        variation=VARIATION,
-    )
+        return Case(reference, q0, None, claims)
 
 
 def _as_far_as_it_goes(

@@ -10,7 +10,15 @@ import numpy as np
 
 from dikbench.errors import unknown
 from dikbench.metrics import METRICS, Metric
-from dikbench.plugins.registry import Plugin, formulation_plugin, make_scenario, plugins
+from dikbench.plugins.building import make_scenario
+from dikbench.plugins.finding import (
+    Plugin,
+    formulation_plugin,
+    in_file,
+    kind_in_file,
+    plugins,
+    scenario_plugin,
+)
 from dikbench.report.tables.kinds import kinds_with
 from dikbench.robots.catalogue import ROBOTS, load_robot
 from dikbench.scenario.oracle import ORACLE
@@ -93,10 +101,11 @@ def description(text: str) -> str:
     name = selector.name
     if name == ORACLE:
         return f"{ORACLE}: {_formulations()[-1][1]}"
-    if name in plugins("formulation") or ".py:" in name:
-        return _plugin(formulation_plugin(name))
-    if name in plugins("scenario"):
-        return "\n".join([_plugin(plugins("scenario")[name]), "", *_difficulty(text)])
+    kind = kind_in_file(name) if in_file(name) else None
+    if kind == "formulation" or name in plugins("formulation"):
+        return _plugin(formulation_plugin(name), "tuned")
+    if kind == "scenario" or name in plugins("scenario"):
+        return "\n".join([_plugin(scenario_plugin(name), "instances"), "", *_difficulty(text)])
     if name in BACK_ENDS:
         return _solver(name)
     if name in ROBOTS:
@@ -111,16 +120,19 @@ def description(text: str) -> str:
     raise unknown("name", name, [*every, *shipped_studies()])
 
 
-def _plugin(plugin: Plugin) -> str:
+def _plugin(plugin: Plugin, drawn: str) -> str:
+    """A plug-in's docstring and parameters; `drawn` says what their drawn ranges are for."""
     parameters = [
-        f"  {p.name}: {p.annotation}" + ("" if p.default is p.empty else f" = {p.default}")
+        f"  {p.name}{'' if p.required else f' = {p.default}'}: {p.valid}"
+        + (f"  ({drawn}: {p.drawn})" if p.drawn else "")
         for p in plugin.parameters.values()
+        if not p.hidden
     ]
     return "\n".join(
         [
             f"{plugin.name} ({plugin.file})",
             "",
-            inspect.getdoc(plugin.documented) or "",
+            inspect.getdoc(plugin.factory) or "",
             "",
             "Parameters:",
             *(parameters or ["  none"]),

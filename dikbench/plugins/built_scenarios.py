@@ -5,14 +5,21 @@ from __future__ import annotations
 from functools import lru_cache
 
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import make_scenario
+from dikbench.plugins.building import make_scenario
+from dikbench.plugins.finding import in_file
 from dikbench.scenario.scenario import Scenario
-from dikbench.selector import Selector
+from dikbench.selector import Selector, parse_selector
 
 
 @lru_cache(maxsize=1024)
 def built(selector: str | Selector, seed: int) -> Scenario | str:
-    """A scenario, or why it cannot be built here: results may come from another installation."""
+    """Build a scenario of some results, or say why it cannot be built here.
+
+    They may come from another installation. A family that is given as a file is not executed:
+    results are data, and remaking their report must not run what they name.
+    """
+    if in_file(parse_selector(selector).name):
+        return f"scenario {selector} is code in a file, which a report does not run"
     try:
         return make_scenario(selector, seed)
     except DikbenchError as error:

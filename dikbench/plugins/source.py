@@ -10,7 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
-from dikbench.plugins.registry import Plugin
+from dikbench.plugins.finding import Plugin
 
 SHARING: Final = ("formulations", "scenarios")
 """Packages whose modules count wherever they are imported; those of a plug-in's own package do too.
@@ -23,7 +23,7 @@ def source_digest(plugin: Plugin) -> str:
     Of its own file and of the modules of its package that it imports, directly or through others:
     laws that share a module change with it, and no other law does.
     """
-    module = plugin.documented.__module__
+    module = plugin.factory.__module__
     packages = frozenset({*SHARING, module.partition(".")[0]})
     files: dict[str, str] = {module: plugin.file}
     waiting = [module]

@@ -21,6 +21,7 @@ from dikbench.linear_algebra import (
     thin_svd,
     volume,
 )
+from dikbench.parameters import Drawn, Parameters, Range
 from dikbench.problem.constraints import (
     CollisionConstraint,
     Constraint,
@@ -66,6 +67,7 @@ __all__ = [
     "DampedInverse",
     "DampingTask",
     "DikProblem",
+    "Drawn",
     "Formulation",
     "Interval",
     "Kinematics",
@@ -77,12 +79,14 @@ __all__ = [
     "Mask",
     "ModelledProgram",
     "OrientationTask",
+    "Parameters",
     "PoseTask",
     "PositionTask",
     "PostureTask",
     "Program",
     "Projector",
     "QuadraticProgram",
+    "Range",
     "Robot",
     "Solve",
     "Task",

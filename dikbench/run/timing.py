@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from dikbench.arrays import Array
-from dikbench.plugins.registry import make_formulation
+from dikbench.plugins.building import make_formulation
 from dikbench.problem.posing import pose_problem
 from dikbench.problem.problem import DikProblem, Formulation, Solve
 from dikbench.results.columns import RATES

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 from dikbench.errors import DikbenchError
 from dikbench.metrics import evaluate, motion_of
-from dikbench.plugins.registry import make_formulation, make_plant, make_scenario
+from dikbench.plugins.building import make_formulation, make_plant, make_scenario
 from dikbench.problem.problem import program_of
 from dikbench.run.provenance import environment
 from dikbench.run.worker_process import calm_down

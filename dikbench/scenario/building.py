@@ -1,6 +1,13 @@
-"""What the families share: checked parameters, limits in force, the start of a run."""
+"""What families are built from: limits in force, the start of a run, motions, usual claims.
+
+Placements are `pinocchio.SE3`, configurations (nq,), joint velocities (nv,) [rad/s or m/s], times
+in seconds; a configuration that depends on time is a function tau [s] -> q.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from math import pi
 
 import numpy as np
 import pinocchio as pin
@@ -11,34 +18,17 @@ from dikbench.linear_algebra import pseudo_inverse
 from dikbench.problem.tasks import PostureTask, Task, TrackingTask
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.robot import Robot
-from dikbench.scenario.oracle import POSE, oracle_motion
+from dikbench.scenario.certificate import Claim
+from dikbench.scenario.oracle import POSE, OracleMotion, oracle_motion
 from dikbench.scenario.reference.reference import Reference
 from dikbench.scenario.steps import steps_in
+
+JointMotion = tuple[Callable[[float], Array], Callable[[float], Array]]
+"""tau [s] -> configuration (nq,), and tau -> its derivative (nv,) [rad/s or m/s]."""
 
 POSTURE_WEIGHT = 1e-4
 """Weight of the secondary posture task: strong enough to choose a posture in the null space, weak
 enough not to be seen in the pose."""
-
-
-def positive(family: str, **values: float) -> None:
-    """Check that parameters are positive and finite.
-
-    Raises:
-        DikbenchError: naming the first that is not.
-    """
-    for name, value in values.items():
-        if not 0 < value < float("inf"):
-            raise DikbenchError(f"scenario {family}: {name}={value} must be positive and finite")
-
-
-def between(family: str, name: str, value: float, low: float, high: float) -> None:
-    """Check that a parameter lies in a range.
-
-    Raises:
-        DikbenchError: if it does not.
-    """
-    if not low <= value <= high:
-        raise DikbenchError(f"scenario {family}: {name}={value} must be between {low} and {high}")
 
 
 def limits_in_force(robot: Robot, *, acceleration: bool) -> Robot:
@@ -125,3 +115,128 @@ def samples(duration: float, dt: float, most: int = 200) -> Array:
     Every control step, or `most` of them where there are more.
     """
     return np.linspace(0.0, duration, min(most, max(2, steps_in(duration, dt))) + 1)
+
+
+def usual_claims(
+    motion: OracleMotion,
+    *,
+    speed: tuple[float, float] | None = None,
+    sigma_min: float | None = None,
+    margin: float | None = None,
+) -> tuple[Claim, ...]:
+    """Claim what most certificates say of the exact motion; what is None is left out.
+
+    Args:
+        motion: the exact joint motion.
+        speed: least and largest peak of the joint speeds over their limits.
+        sigma_min: least smallest singular value of the task Jacobian (m, rad).
+        margin: least distance to a position limit [rad].
+    """
+    claims = []
+    if speed is not None:
+        claims.append(Claim("required speed over limit", motion.peak_speed_ratio, *speed))
+    if sigma_min is not None:
+        sigma = motion.sigma_min.min()
+        claims.append(Claim("smallest singular value (m, rad)", sigma, sigma_min))
+    if margin is not None:
+        claims.append(Claim("position margin [rad]", motion.margin.min(), margin))
+    return tuple(claims)
+
+
+def there_and_back(robot: Robot, start: Array, way: Array, duration: float) -> JointMotion:
+    """The joint motion q(t) = start + sin^2(pi t/T) way, with its derivative.
+
+    Args:
+        robot: the robot.
+        start: configuration at both ends, (nq,).
+        way: from the start to half way, (nv,) [rad or m].
+        duration: T [s].
+    """
+
+    def q(tau: float) -> Array:
+        moved: Array = pin.integrate(robot.model, start, np.sin(pi * tau / duration) ** 2 * way)
+        return moved
+
+    def v(tau: float) -> Array:
+        rate: Array = pi / duration * np.sin(2 * pi * tau / duration) * way
+        return rate
+
+    return q, v
+
+
+def at_constant_rate(robot: Robot, start: Array, rate: Array) -> JointMotion:
+    """The joint motion q(t) = start + t rate, with its derivative.
+
+    Args:
+        robot: the robot.
+        start: configuration at the beginning, (nq,).
+        rate: joint velocity, (nv,) [rad/s or m/s].
+    """
+
+    def q(tau: float) -> Array:
+        moved: Array = pin.integrate(robot.model, start, tau * rate)
+        return moved
+
+    return q, lambda tau: rate
+
+
+def motion_of_a_step(robot: Robot, q0: Array, twist: Array, gain: float) -> OracleMotion:
+    """Measure the motion that a proportional law asks for after a step of the target.
+
+    It goes straight, along the screw, at first at gain times the distance, and there in 1/gain.
+
+    Args:
+        robot: the robot.
+        q0: configuration at the start, (nq,).
+        twist: the body twist (6,) that leads from the start to the target in one second.
+        gain: of the tracking task [1/s].
+    """
+    start = placement_of(robot, q0)
+    straight = Reference(
+        1 / gain,
+        lambda tau: start * pin.exp6(pin.Motion(gain * tau * twist)),
+        lambda tau: gain * twist,
+    )
+    return oracle_motion(robot, straight, q0, np.linspace(0.0, straight.duration, 51))
+
+
+def step_claims(motion: OracleMotion) -> tuple[Claim, Claim]:
+    """Claim that the motion after a step (see `motion_of_a_step`) meets nothing on its way."""
+    return (
+        Claim("smallest singular value on the way", motion.sigma_min.min(), at_least=0.03),
+        Claim("position margin on the way [rad]", motion.margin.min(), at_least=0.05),
+    )
+
+
+def collision_claims(
+    motion: OracleMotion, distance: Array, margin: float, *, depth: float, speed: float
+) -> tuple[Claim, ...]:
+    """Claim that a motion goes into something, comes back, and is about nothing else.
+
+    Args:
+        motion: the exact joint motion.
+        distance: the least distance at each of its samples, (k + 1,) [m], negative inside.
+        margin: distance that is to be kept [m].
+        depth: how far inside the motion goes at least [m].
+        speed: peak of the joint speeds over their limits.
+    """
+    return (
+        Claim("least distance of the reference's motion [m]", distance.min(), -0.1, -depth),
+        Claim("distance at the start [m]", distance[0], at_least=1.5 * margin),
+        Claim("distance at the end [m]", distance[-1], at_least=1.5 * margin),
+        *usual_claims(motion, sigma_min=0.04, margin=0.1),
+        *usual_claims(motion, speed=(0.8 * speed, 1.2 * speed)),
+    )
+
+
+def check_can_lift(robot: Robot, certified: tuple[str, ...]) -> None:
+    """Check that an arm can lift.
+
+    Raises:
+        DikbenchError: if it moves in a plane; the message lists the `certified` ones.
+    """
+    if 2 not in robot.task_rows:
+        raise DikbenchError(
+            f"robot {robot.name} moves in a plane and cannot lift; "
+            f"valid: {', '.join(certified)}, a URDF"
+        )

@@ -7,13 +7,13 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 import pinocchio as pin
 
 from dikbench.arrays import Array, read_only
-from dikbench.errors import DikbenchError
+from dikbench.parameters import Parameters, Range
 from dikbench.robots.limits import Limits
 from dikbench.scenario.scenario import Scenario
 
@@ -25,7 +25,7 @@ NOISE_STREAM: Final = 3
 
 
 @dataclass(frozen=True)
-class Plant(ABC):
+class Plant(Parameters, ABC):
     """A drive behind a measurement and a line of communication.
 
     Attributes:
@@ -35,15 +35,8 @@ class Plant(ABC):
             keeps the velocity that it has at the start.
     """
 
-    noise: float = 0.0
-    delay: int = 0
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        if not 0 <= self.noise < np.inf:
-            raise DikbenchError(f"plant: noise={self.noise} must be finite and at least 0 [rad]")
-        if not 0 <= self.delay <= LONGEST_DELAY:
-            raise DikbenchError(f"plant: delay={self.delay} must be 0 to {LONGEST_DELAY} steps")
+    noise: Annotated[float, Range(0.0, unit="rad or m")] = 0.0
+    delay: Annotated[int, Range(0, LONGEST_DELAY, "steps")] = 0
 
     @abstractmethod
     def drive(self, v: Array, limits: Limits, dt: float) -> Array:

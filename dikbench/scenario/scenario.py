@@ -21,6 +21,12 @@ from dikbench.scenario.steps import steps_in
 from dikbench.scenario.variation import NO_VARIATION, Variation
 
 
+def first_level(tracking: TrackingTask, tasks: tuple[Task, ...]) -> TrackingTask:
+    """Join the tracking with those of the other tasks that are of its priority."""
+    equal = tuple(task for task in tasks if task.priority == tracking.priority)
+    return TrackingTogether(tracking, equal) if equal else tracking
+
+
 @dataclass(frozen=True, eq=False)
 class Scenario:
     """A closed-loop case, made once from parameters and a seed.
@@ -72,8 +78,7 @@ class Scenario:
     @cached_property
     def first(self) -> TrackingTask:
         """The tracking, together with what is of the same priority."""
-        equal = tuple(task for task in self.tasks if task.priority == self.tracking.priority)
-        return TrackingTogether(self.tracking, equal) if equal else self.tracking
+        return first_level(self.tracking, self.tasks)
 
     @cached_property
     def targets(self) -> list[tuple[Any, Any]]:

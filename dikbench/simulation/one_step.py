@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError, unknown
-from dikbench.plugins.registry import make_formulation
+from dikbench.plugins.building import make_formulation
 from dikbench.problem.constraints import Constraint
 from dikbench.problem.posing import pose_problem
 from dikbench.problem.problem import Formulation, program_of

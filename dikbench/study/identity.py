@@ -8,13 +8,8 @@ from dataclasses import astuple, fields, is_dataclass
 from functools import lru_cache
 from typing import Any
 
-from dikbench.plugins.registry import (
-    formulation_plugin,
-    make_formulation,
-    make_plant,
-    scenario_parameters,
-    scenario_plugin,
-)
+from dikbench.plugins.building import make_formulation, make_plant, scenario_parameters
+from dikbench.plugins.finding import formulation_plugin, scenario_plugin
 from dikbench.plugins.source import digest, digest_of_file, source_digest
 from dikbench.scenario.oracle import ORACLE
 from dikbench.selector import Selector

@@ -9,7 +9,7 @@ from typing import Final
 import msgspec
 
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import (
+from dikbench.plugins.building import (
     make_formulation,
     make_plant,
     make_scenario,

@@ -10,7 +10,9 @@ from typing import Annotated, Any, Literal
 import msgspec
 
 from dikbench.errors import DikbenchError, unknown
-from dikbench.plugins.registry import make_formulation
+from dikbench.plugins.building import (
+    make_formulation,
+)
 from dikbench.problem.problem import program_of
 from dikbench.programs.quadratic_program import Program
 from dikbench.scenario.oracle import ORACLE

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import make_scenario
+from dikbench.plugins.building import make_scenario
 from dikbench.results.columns import TRIAL
 from dikbench.results.exports import TRIALS
 from dikbench.results.folder import ResultsFolder

@@ -22,7 +22,8 @@ from time import perf_counter
 import numpy as np
 
 from dikbench.arrays import Array
-from dikbench.plugins.registry import make_formulation, make_scenario, plugins
+from dikbench.plugins.building import make_formulation, make_scenario
+from dikbench.plugins.finding import plugins
 from dikbench.problem import DikProblem, program_of
 from dikbench.run.timing import record_problems
 from dikbench.solvers.checked_solve import make_solve

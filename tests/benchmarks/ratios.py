@@ -28,7 +28,7 @@ import numpy as np
 import pinocchio as pin
 from peer_ticks import bare_dls_tick, drake_tick, mink_tick, pink_tick
 
-from dikbench.plugins.registry import make_formulation, make_scenario
+from dikbench.plugins.building import make_formulation, make_scenario
 from dikbench.problem import DikProblem, program_of
 from dikbench.problem.tasks import PostureTask
 from dikbench.robots.limits import JointLimits

@@ -8,24 +8,15 @@ first build in a process takes, with the robot.
 
 from __future__ import annotations
 
-import sys
-import typing
 from statistics import median
 from time import perf_counter
 
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import Plugin, make_scenario, plugins
+from dikbench.plugins.building import make_scenario
+from dikbench.plugins.finding import plugins
+from dikbench.scenario.family import certified_robots
 
 BUILDS = 5
-
-
-def robots_of(family: Plugin) -> tuple[str, ...]:
-    """The robots that a family lists, in its type or in its module."""
-    hint = typing.get_type_hints(family.documented)["robot"]
-    if typing.get_origin(hint) is typing.Literal:
-        return typing.get_args(hint)
-    listed: tuple[str, ...] = sys.modules[family.build.__module__].ROBOTS
-    return listed
 
 
 def build(selector: str) -> float:
@@ -39,11 +30,11 @@ def main() -> None:
     """Print the table."""
     rows = []
     for name, family in plugins("scenario").items():
-        required = [p for p in family.parameters.values() if p.default is p.empty]
+        required = [p for p in family.parameters.values() if p.required]
         if required:
             print(f"{name}: not timed, {required[0].name} must be given")
             continue
-        for robot in robots_of(family):
+        for robot in certified_robots(family.factory):
             for more in ("", ",dt=0.001"):
                 selector = f"{name}[robot={robot}{more}]"
                 try:

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import make_formulation, make_scenario
+from dikbench.plugins.building import make_formulation, make_scenario
 from dikbench.selector import Selector, parse_selector
 from dikbench.solvers.catalogue.back_ends import BACK_ENDS, parse_solver
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from dikbench import DikProblem, LinearizedTask, PostureTask, Robot, load_robot
 from dikbench.arrays import Array
-from dikbench.plugins.registry import make_formulation
+from dikbench.plugins.building import make_formulation
 from dikbench.robots.kinematics import Kinematics
 from dikbench.solvers.checked_solve import make_solve
 from dikbench.testing.states import SINGULAR

@@ -12,7 +12,8 @@ import pytest
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError, Infeasible
-from dikbench.plugins.registry import make_formulation, plugins
+from dikbench.plugins.building import make_formulation
+from dikbench.plugins.finding import plugins
 from dikbench.problem import DikProblem, Formulation, LimitKind, Solve, program_of
 from dikbench.programs.quadratic_program import QuadraticProgram
 from dikbench.testing import CHECKS, Check, check_formulation

@@ -23,7 +23,7 @@ from dikbench import (
     solve_dik,
 )
 from dikbench.arrays import Array
-from dikbench.plugins.registry import make_formulation
+from dikbench.plugins.building import make_formulation
 from dikbench.problem import DikProblem, Formulation
 from dikbench.robots.kinematics import Kinematics, smallest_singular_value
 from dikbench.robots.planar_arm import planar_arm

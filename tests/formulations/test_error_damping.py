@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from dikbench import DikProblem, LinearizedTask, QuadraticProgram, load_robot
 from dikbench.arrays import Array
-from dikbench.plugins.registry import make_formulation
+from dikbench.plugins.building import make_formulation
 from dikbench.solvers.catalogue.back_ends import parse_solver
 from dikbench.solvers.checked_solve import make_solve
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from dikbench import DikProblem, LinearizedTask, PostureTask, Robot, load_robot
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import make_formulation
+from dikbench.plugins.building import make_formulation
 from dikbench.problem.tasks import PositionTask
 from dikbench.problem.tasks.posture import middle_posture
 from dikbench.robots.kinematics import Kinematics, smallest_singular_value

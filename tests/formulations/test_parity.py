@@ -12,7 +12,7 @@ import pytest
 
 from dikbench import DikAnswer, Robot, load_robot, solve_dik
 from dikbench.arrays import Array
-from dikbench.plugins.registry import make_formulation
+from dikbench.plugins.building import make_formulation
 from dikbench.problem import DikProblem
 from dikbench.problem.tasks import LinearizedTask, PoseTask, PostureTask
 from dikbench.programs.quadratic_program import QuadraticProgram

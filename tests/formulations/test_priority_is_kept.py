@@ -11,7 +11,8 @@ import pytest
 
 from dikbench import DikProblem, LinearizedTask, PostureTask, Robot, load_robot
 from dikbench.arrays import Array
-from dikbench.plugins.registry import make_formulation, plugins
+from dikbench.plugins.building import make_formulation
+from dikbench.plugins.finding import plugins
 from dikbench.problem import program_of
 from dikbench.robots.kinematics import Kinematics, smallest_singular_value
 from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, parse_solver

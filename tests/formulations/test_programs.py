@@ -15,7 +15,7 @@ from hypothesis.extra.numpy import arrays
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError, Infeasible, SolverFailed
 from dikbench.linear_algebra import null_space
-from dikbench.plugins.registry import make_formulation
+from dikbench.plugins.building import make_formulation
 from dikbench.problem import DikProblem, program_of
 from dikbench.problem.tasks import LinearizedTask, OrientationTask, PositionTask, PostureTask
 from dikbench.robots.catalogue import load_robot
@@ -410,15 +410,21 @@ def test_the_null_space_is_orthonormal_and_complete(A: Array) -> None:
 @pytest.mark.parametrize(
     ("law", "words"),
     [
-        ("drake[centering=-1]", "drake: centering must be finite"),
-        ("drake-system[tracking_weight=0]", "drake-system: tracking_weight must be positive"),
-        ("hqp[damping=-1]", "hqp: damping must be finite"),
-        ("neo[stop_distance=1]", "neo: stop_distance must be at least 0, below"),
-        ("pink-qp[position_gain=0]", "pink-qp: position_gain must be above 0"),
-        ("mink-qp[lm_damping=-1]", "mink-qp: lm_damping must be finite"),
-        ("qp-velocity[damping=inf]", "qp-velocity: damping must be finite"),
-        ("alpha-two-stage[rank_tolerance=-1]", "alpha-two-stage: rank_tolerance must be"),
-        ("lp-alpha-components[regularization=-1]", "lp-alpha-components: regularization must be"),
+        ("drake[centering=-1]", "drake: centering=-1.0 must be finite"),
+        (
+            "drake-system[tracking_weight=0]",
+            "drake-system: tracking_weight=0.0 must be finite and above 0",
+        ),
+        ("hqp[damping=-1]", "hqp: damping=-1.0 must be finite"),
+        ("neo[stop_distance=1]", "neo: stop_distance=1.0 must be below influence_distance=0.9"),
+        ("pink-qp[position_gain=0]", "pink-qp: position_gain=0.0 must be above 0"),
+        ("mink-qp[lm_damping=-1]", "mink-qp: lm_damping=-1.0 must be finite"),
+        ("qp-velocity[damping=inf]", "qp-velocity: damping=inf must be finite"),
+        ("alpha-two-stage[rank_tolerance=-1]", "alpha-two-stage: rank_tolerance=-1.0 must be"),
+        (
+            "lp-alpha-components[regularization=-1]",
+            "lp-alpha-components: regularization=-1.0 must be",
+        ),
     ],
 )
 def test_parameters_out_of_range_are_one_line(law: str, words: str) -> None:

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from dikbench import LinearizedTask, PostureTask, load_robot
 from dikbench.arrays import Array
-from dikbench.plugins.registry import make_formulation, plugins
+from dikbench.plugins.building import make_formulation
+from dikbench.plugins.finding import plugins
 from dikbench.problem import DikProblem, Formulation, LimitKind, Solve, program_of
 from dikbench.problem.velocity_box import velocity_box
 from dikbench.robots.kinematics import Kinematics

@@ -7,7 +7,8 @@ from functools import cache
 import msgspec
 import pytest
 
-from dikbench.plugins.registry import make_formulation, plugins
+from dikbench.plugins.building import make_formulation
+from dikbench.plugins.finding import plugins
 from dikbench.problem import Formulation, program_of, promises_of
 from dikbench.simulation.control_step import control_step
 from dikbench.simulation.status import Status

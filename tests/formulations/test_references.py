@@ -8,7 +8,7 @@ from pathlib import Path
 import formulations
 from dikbench.cli.listing import listing
 from dikbench.metrics import METRICS
-from dikbench.plugins.registry import plugins
+from dikbench.plugins.finding import plugins
 from formulations import FORMULATIONS
 
 FOLDER = Path(formulations.__file__).parent

@@ -11,7 +11,7 @@ import pytest
 from dikbench import LinearizedTask, Robot, load_robot
 from dikbench.arrays import Array
 from dikbench.errors import Infeasible
-from dikbench.plugins.registry import make_formulation
+from dikbench.plugins.building import make_formulation
 from dikbench.problem import DikProblem, program_of
 from dikbench.programs.quadratic_program import QuadraticProgram
 from dikbench.robots.kinematics import Kinematics, smallest_singular_value

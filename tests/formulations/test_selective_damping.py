@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from dikbench import DikProblem, LinearizedTask, load_robot
 from dikbench.arrays import Array
-from dikbench.plugins.registry import make_formulation
+from dikbench.plugins.building import make_formulation
 from dikbench.solvers.checked_solve import make_solve
 
 STRETCHED = np.array([[0.0, 0.0], [2.0, 1.0]])

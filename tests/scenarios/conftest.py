@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from dikbench.metrics import evaluate, motion_of
-from dikbench.plugins.registry import make_formulation, make_plant
+from dikbench.plugins.building import make_formulation, make_plant
 from dikbench.problem import program_of
 from dikbench.scenario import Scenario
 from dikbench.simulation.closed_loop import simulate

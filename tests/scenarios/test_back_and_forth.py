@@ -12,7 +12,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import make_scenario
+from dikbench.plugins.building import make_scenario
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
 from scenarios.back_and_forth import SET_UPS
@@ -100,7 +100,7 @@ def test_feed_forward_follows_to_the_discretization(metrics: Metrics) -> None:
 
 def test_a_slow_sweep_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """With joints that are three times as fast it asks for too little of them."""
-    module = sys.modules["scenarios.back_and_forth"]
+    module = sys.modules["dikbench.scenario.family"]
     arm = load_robot("ur5", "ee_link")
     velocity = arm.limits.velocity
     assert velocity is not None
@@ -133,7 +133,7 @@ def test_errors_say_what_is_valid() -> None:
     """One line each."""
     for selector, words in (
         ("back-and-forth[robot=talos]", "valid: ur3, ur5, ur10, panda"),
-        ("back-and-forth[dt=-1]", "dt=-1.0 must be positive"),
+        ("back-and-forth[dt=-1]", "dt=-1.0 must be finite and above 0"),
     ):
         with pytest.raises(DikbenchError) as caught:
             make_scenario(selector)

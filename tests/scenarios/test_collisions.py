@@ -14,7 +14,7 @@ import pytest
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.metrics import motion_of
-from dikbench.plugins.registry import make_formulation, make_scenario
+from dikbench.plugins.building import make_formulation, make_scenario
 from dikbench.problem import program_of
 from dikbench.problem.constraints import CollisionConstraint
 from dikbench.robots.kinematics import Kinematics
@@ -213,10 +213,10 @@ def test_an_arm_that_stays_unfolded_does_not_certify(monkeypatch: pytest.MonkeyP
     [
         ("obstacle[robot=lwr]", "robot=lwr with where=hand; valid: panda, ur3, ur5, ur10, xarm7"),
         ("obstacle[robot=ur5,where=elbow]", "valid: panda, xarm7, lwr"),
-        ("obstacle[depth=0.2]", "depth=0.2 must be between 0.01 and 0.05"),
+        ("obstacle[depth=0.2]", "depth=0.2 must be 0.01 to 0.05"),
         ("obstacle[shape=cone]", "sphere, capsule, box"),
-        ("obstacle[speed=2]", "speed=2.0 must be between 0.05 and 0.9"),
-        ("self-collision[speed=0]", "speed=0.0 must be between 0.05 and 0.9"),
+        ("obstacle[speed=2]", "speed=2.0 must be 0.05 to 0.9"),
+        ("self-collision[speed=0]", "speed=0.0 must be 0.05 to 0.9"),
         ("self-collision[robot=base]", "panda"),
     ],
 )

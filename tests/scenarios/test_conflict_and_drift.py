@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import make_scenario
+from dikbench.parameters import Range
+from dikbench.plugins.building import make_scenario
 from dikbench.problem.tasks import PositionTask
 from dikbench.robots.kinematics import Kinematics
 from scenarios.task_conflict import CONFLICTS
@@ -117,7 +118,8 @@ def test_the_square_wave_is_as_asked() -> None:
 def test_a_drift_without_a_turn_does_not_certify(monkeypatch: pytest.MonkeyPatch) -> None:
     """Blunted: nothing to swing out for."""
     module = sys.modules["scenarios.log_derivative_drift"]
-    monkeypatch.setattr(module, "between", lambda *given: None)
+    monkeypatch.setattr(Range, "check", lambda *given: None)
+    monkeypatch.setattr(module.LogDerivativeDrift, "check", lambda family: None)
     with pytest.raises(DikbenchError, match="length of the screw over the distance"):
         make_scenario("log-derivative-drift[turn=0.6]")
     with pytest.raises(DikbenchError, match="yaw between the poses"):
@@ -164,8 +166,9 @@ def test_a_base_that_does_not_turn_spirals_in(metrics: Metrics) -> None:
     ("selector", "part"),
     [
         ("task-conflict[robot=ur5]", "planar4r, planar3r, panda"),
-        ("task-conflict[speed=2]", "speed=2.0 must be between 0.05 and 0.9"),
-        ("log-derivative-drift[turn=3.2]", "turn=3.2 must be between 2.0 and 3.0"),
+        ("task-conflict[speed=2]", "speed=2.0 must be 0.05 to 0.9"),
+        ("log-derivative-drift[turn=3.2]", "turn=3.2 must be -3 to 3 [rad]"),
+        ("log-derivative-drift[turn=-1.5]", "turn=-1.5 must be -3 to -2 or 2 to 3 [rad]"),
         ("log-derivative-drift[robot=panda]", "base"),
     ],
 )

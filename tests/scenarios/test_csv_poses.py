@@ -12,7 +12,7 @@ import pinocchio as pin
 import pytest
 
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import make_scenario
+from dikbench.plugins.building import make_scenario
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
 
@@ -115,7 +115,7 @@ def test_a_pose_that_cannot_be_had_is_named_by_its_line(
 
 def test_a_start_outside_the_limits_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the robot could take the first pose only beyond one of its limits."""
-    module = sys.modules["scenarios.csv_poses"]
+    module = sys.modules["dikbench.scenario.family"]
     arm = load_robot("panda")
     position = arm.limits.position
     assert position is not None

@@ -9,7 +9,7 @@ import pytest
 
 from dikbench.arrays import Array
 from dikbench.metrics import Motion, motion_of
-from dikbench.plugins.registry import make_formulation, make_scenario
+from dikbench.plugins.building import make_formulation, make_scenario
 from dikbench.problem import program_of
 from dikbench.problem.progress import off_course, progress
 from dikbench.scenario.plant import Ideal

@@ -10,7 +10,7 @@ import pytest
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import make_scenario
+from dikbench.plugins.building import make_scenario
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.robot import Robot
@@ -143,8 +143,10 @@ def test_limits_that_it_does_not_reach_are_refused(
     limits: dict[str, object], words: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """With a wider range, or faster joints, the hexagon is no test of them."""
-    module = sys.modules["scenarios.hexagon"]
-    monkeypatch.setattr(module, "load_robot", lambda name: load_robot(name).with_limits(**limits))
+    module = sys.modules["dikbench.scenario.family"]
+    monkeypatch.setattr(
+        module, "load_robot", lambda name, frame: load_robot(name).with_limits(**limits)
+    )
     for robot in ROBOTS:
         with pytest.raises(DikbenchError, match=words):
             make_scenario(f"hexagon[robot={robot}]")
@@ -154,9 +156,9 @@ def test_limits_that_it_does_not_reach_are_refused(
     ("selector", "words"),
     [
         ("hexagon[robot=ur5]", "valid: lwr, planar4r"),
-        ("hexagon[speed=3]", "speed=3.0 must be between 0.05 and 2.0"),
-        ("hexagon[laps=0]", "laps=0 must be between 1 and 5"),
-        ("hexagon[dt=0]", "dt=0.0 must be positive"),
+        ("hexagon[speed=3]", "speed=3.0 must be 0.05 to 2"),
+        ("hexagon[laps=0]", "laps=0 must be 1 to 5"),
+        ("hexagon[dt=0]", "dt=0.0 must be finite and above 0"),
     ],
 )
 def test_errors_say_what_is_valid(selector: str, words: str) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import make_scenario
+from dikbench.plugins.building import make_scenario
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
 from scenarios.hold_still import POSTURES, Postures
@@ -93,7 +93,9 @@ def test_postures_that_are_not_near_are_refused(monkeypatch: pytest.MonkeyPatch)
     with pytest.raises(DikbenchError, match="position margin"):
         make_scenario("hold-still[robot=ur5,posture=limit]")
     monkeypatch.setattr(
-        module, "load_robot", lambda name: load_robot(name).with_limits(position=None)
+        sys.modules["dikbench.scenario.family"],
+        "load_robot",
+        lambda name, frame: load_robot(name).with_limits(position=None),
     )
     with pytest.raises(DikbenchError, match="robot ur5 has no limits"):
         make_scenario("hold-still[robot=ur5,posture=limit]")
@@ -104,7 +106,7 @@ def test_postures_that_are_not_near_are_refused(monkeypatch: pytest.MonkeyPatch)
     [
         ("hold-still[robot=talos]", "valid: panda, ur3, ur5, ur10"),
         ("hold-still[posture=elbow]", "valid: start, singular, limit"),
-        ("hold-still[gain=0]", "gain=0.0 must be positive"),
+        ("hold-still[gain=0]", "gain=0.0 must be finite and above 0"),
     ],
 )
 def test_errors_say_what_is_valid(selector: str, words: str) -> None:

@@ -10,10 +10,10 @@ import pinocchio as pin
 import pytest
 
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import make_scenario
+from dikbench.plugins.building import make_scenario
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
-from scenarios.pick_and_place import ROBOTS
+from scenarios.pick_and_place import PickAndPlace
 
 Metrics = Callable[..., dict[str, float]]
 
@@ -52,7 +52,7 @@ def test_it_rests_between_the_legs_and_while_it_grasps() -> None:
         assert np.abs(reference.velocity(share * reference.duration)).max() > 0.05
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", PickAndPlace.robots)
 def test_every_arm_does_it_from_twenty_starts(robot: str) -> None:
     """The certificate holds (building asserts it), and the oracle is where the reference is."""
     for seed in range(21):
@@ -67,7 +67,7 @@ def test_every_arm_does_it_from_twenty_starts(robot: str) -> None:
             assert X.homogeneous == pytest.approx(wanted, abs=1e-8)
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", PickAndPlace.robots)
 def test_the_peak_speed_is_that_of_the_pseudo_inverse(robot: str) -> None:
     """Recomputed without the oracle: the largest least-norm velocity on the path over its limit."""
     scenario = make_scenario(f"pick-and-place[robot={robot}]")
@@ -103,7 +103,7 @@ def test_faster_than_the_limits_only_some_laws_keep_them(metrics: Metrics) -> No
 
 def test_a_place_next_to_a_limit_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the base cannot turn so far, the certificate says so."""
-    module = sys.modules["scenarios.pick_and_place"]
+    module = sys.modules["dikbench.scenario.family"]
     arm = load_robot("ur5")
     position = arm.limits.position
     assert position is not None
@@ -118,10 +118,10 @@ def test_a_place_next_to_a_limit_is_refused(monkeypatch: pytest.MonkeyPatch) -> 
 @pytest.mark.parametrize(
     ("selector", "words"),
     [
-        ("pick-and-place[width=1]", "width=1.0 must be between 0.1 and 0.4"),
-        ("pick-and-place[height=0]", "height=0.0 must be between 0.02 and 0.15"),
-        ("pick-and-place[turn=-1]", "turn=-1.0 must be between 0.0 and 1.5"),
-        ("pick-and-place[speed=9]", "speed=9.0 must be between 0.1 and 3.0"),
+        ("pick-and-place[width=1]", "width=1.0 must be 0.1 to 0.4"),
+        ("pick-and-place[height=0]", "height=0.0 must be 0.02 to 0.15"),
+        ("pick-and-place[turn=-1]", "turn=-1.0 must be 0 to 1.5"),
+        ("pick-and-place[speed=9]", "speed=9.0 must be 0.1 to 3"),
         ("pick-and-place[robot=talos,width=0.4,turn=1.5]", "position margin [rad]"),
         ("pick-and-place[robot=planar3r]", "robot planar3r moves in a plane and cannot lift"),
     ],

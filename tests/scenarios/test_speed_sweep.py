@@ -10,17 +10,17 @@ import pinocchio as pin
 import pytest
 
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import make_scenario
+from dikbench.plugins.building import make_scenario
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.robot import Robot
-from scenarios.speed_sweep import ROBOTS
+from scenarios.speed_sweep import SpeedSweep
 
 Metrics = Callable[..., dict[str, float]]
 
 VARIANTS = [
     f"speed-sweep[robot={robot},path={path}]"
-    for robot in ROBOTS
+    for robot in SpeedSweep.robots
     for path in ("circle", "lemniscate")
 ]
 
@@ -109,7 +109,7 @@ def test_below_the_limits_every_law_follows(metrics: Metrics) -> None:
 
 def test_a_sweep_into_a_limit_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where a joint would meet its limit on the curve the case would be another one."""
-    module = sys.modules["scenarios.speed_sweep"]
+    module = sys.modules["dikbench.scenario.family"]
     arm = load_robot("ur5")
     position = arm.limits.position
     assert position is not None
@@ -126,9 +126,9 @@ def test_a_sweep_into_a_limit_is_refused(monkeypatch: pytest.MonkeyPatch) -> Non
     ("selector", "words"),
     [
         ("speed-sweep[path=square]", "valid: circle, lemniscate"),
-        ("speed-sweep[turn=1]", "turn=1.0 must be between 0.0 and 0.5"),
-        ("speed-sweep[laps=6]", "laps=6.0 must be between 1.0 and 5.0"),
-        ("speed-sweep[speed=4]", "speed=4.0 must be between 0.1 and 3.0"),
+        ("speed-sweep[turn=1]", "turn=1.0 must be 0 to 0.5"),
+        ("speed-sweep[laps=6]", "laps=6.0 must be 1 to 5"),
+        ("speed-sweep[speed=4]", "speed=4.0 must be 0.1 to 3"),
         ("speed-sweep[robot=ur3,radius=0.15]", "robot ur3: no posture found"),
     ],
 )

@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import make_scenario
+from dikbench.plugins.building import make_scenario
 from dikbench.robots.kinematics import Kinematics
 from dikbench.scenario import Scenario
 from dikbench.scenario.oracle import solve_placement
@@ -92,13 +92,13 @@ def test_clipping_goes_off_course_and_scaling_does_not(metrics: Metrics) -> None
 
 def test_a_step_that_asks_for_nothing_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """Joints that are ten times as fast are not tried by it."""
-    module = sys.modules["scenarios.step"]
+    module = sys.modules["dikbench.scenario.family"]
     load = module.load_robot
     for robot in ("ur5", "panda"):
         velocity = load(robot).limits.velocity
         assert velocity is not None
         fast = load(robot).with_limits(velocity=20 * velocity.upper)
-        monkeypatch.setattr(module, "load_robot", lambda name, fast=fast: fast)
+        monkeypatch.setattr(module, "load_robot", lambda name, frame, fast=fast: fast)
         with pytest.raises(DikbenchError, match="first speed over limit"):
             make_scenario(f"step[robot={robot}]")
 
@@ -106,10 +106,10 @@ def test_a_step_that_asks_for_nothing_is_refused(monkeypatch: pytest.MonkeyPatch
 @pytest.mark.parametrize(
     ("selector", "words"),
     [
-        ("step[distance=0.5]", "distance=0.5 must be between 0.05 and 0.3"),
-        ("step[angle=3]", "angle=3.0 must be between 0.5 and 2.62"),
+        ("step[distance=0.5]", "distance=0.5 must be 0.05 to 0.3"),
+        ("step[angle=3]", "angle=3.0 must be 0.5 to 2.62"),
         ("step[robot=base]", "valid: panda, ur3"),
-        ("step[duration=0]", "duration=0.0 must be positive"),
+        ("step[duration=0]", "duration=0.0 must be finite and above 0"),
     ],
 )
 def test_errors_say_what_is_valid(selector: str, words: str) -> None:

@@ -11,12 +11,12 @@ import pytest
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import make_scenario
+from dikbench.plugins.building import make_scenario
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.robot import Robot
-from dikbench.scenario import Scenario
+from dikbench.scenario import Range, Scenario
 from dikbench.scenario.oracle import solve_placement
-from scenarios.workspace_boundary import ROBOTS
+from scenarios.workspace_boundary import WorkspaceBoundary
 
 Metrics = Callable[..., dict[str, float]]
 
@@ -30,7 +30,7 @@ def _somewhere(robot: Robot, random: np.random.Generator) -> Array:
     return q
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", WorkspaceBoundary.robots)
 def test_nothing_reaches_beyond_the_boundary_and_something_just_before_it(robot: str) -> None:
     """From twenty postures anywhere none does the target at 1.02 of the reach; one does 0.99."""
     scenario = make_scenario(f"workspace-boundary[robot={robot},path=still,extent=1.02]")
@@ -62,7 +62,7 @@ def test_the_reach_of_a_planar_arm_is_known_in_closed_form() -> None:
         assert _claims(scenario)["reach"] == pytest.approx(reach, abs=2e-4)
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", WorkspaceBoundary.robots)
 def test_the_boundary_is_singular_and_no_limit_from_any_start(robot: str) -> None:
     """For twenty seeds, as claimed; the motion ends at it, so there is no oracle."""
     for seed in range(21):
@@ -116,8 +116,7 @@ def test_out_of_reach_damping_stretches_the_arm_and_stands_still(metrics: Metric
 
 def test_a_target_within_reach_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """With the range of `extent` out of the way, the certificate says that it is no boundary."""
-    module = sys.modules["scenarios.workspace_boundary"]
-    monkeypatch.setattr(module, "between", lambda *parameters: None)
+    monkeypatch.setattr(Range, "check", lambda *given: None)
     for path in ("out-and-back", "still"):
         with pytest.raises(DikbenchError, match="farthest target over the reach"):
             make_scenario(f"workspace-boundary[path={path},extent=0.9]")
@@ -125,7 +124,7 @@ def test_a_target_within_reach_is_refused(monkeypatch: pytest.MonkeyPatch) -> No
 
 def test_a_boundary_that_is_a_limit_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the elbow's limit comes before the stretched arm."""
-    module = sys.modules["scenarios.workspace_boundary"]
+    module = sys.modules["dikbench.scenario.family"]
     arm = load_robot("panda")
     position = arm.limits.position
     assert position is not None
@@ -140,8 +139,8 @@ def test_a_boundary_that_is_a_limit_is_refused(monkeypatch: pytest.MonkeyPatch) 
 @pytest.mark.parametrize(
     ("selector", "words"),
     [
-        ("workspace-boundary[extent=0.9]", "extent=0.9 must be between 1.0 and 1.5"),
-        ("workspace-boundary[speed=0]", "speed=0.0 must be between 0.05 and 2.0"),
+        ("workspace-boundary[extent=0.9]", "extent=0.9 must be 1 to 1.5"),
+        ("workspace-boundary[speed=0]", "speed=0.0 must be 0.05 to 2"),
         ("workspace-boundary[path=in]", "valid: out-and-back, still"),
         ("workspace-boundary[robot=ur6]", "unknown robot 'ur6'"),
     ],

@@ -11,7 +11,7 @@ from typing import Final
 import pandas as pd
 
 from dikbench.plugins.built_scenarios import built
-from dikbench.plugins.registry import plugins
+from dikbench.plugins.finding import in_file, plugins
 from dikbench.report.contents.bibliography import references
 from dikbench.report.contents.docstring import Docstring, parse_docstring
 from dikbench.results.columns import SELECTORS
@@ -133,23 +133,24 @@ def _described(name: str) -> tuple[str | None, dict[str, str], Path | None]:
             {},
             None,
         )
-    path, colon, class_name = name.rpartition(":")
-    if colon and path.endswith(".py"):
-        return *_read(Path(path), class_name), None
+    if in_file(name):
+        return *_read(name), None
     plugin = plugins("formulation").get(name)
     if plugin is None:
         return None, {}, None
     defaults = {
         key: str(parameter.default)
         for key, parameter in plugin.parameters.items()
-        if parameter.default is not parameter.empty
+        if not parameter.required
     }
-    return plugin.documented.__doc__ or "", defaults, Path(plugin.file)
+    return plugin.factory.__doc__ or "", defaults, Path(plugin.file)
 
 
-def _read(file: Path, class_name: str) -> tuple[str | None, dict[str, str]]:
+def _read(name: str) -> tuple[str | None, dict[str, str]]:
+    """Read docstring and defaults of a class that is given as `path/to/file.py:Class`."""
+    path, _, class_name = name.rpartition(":")
     try:
-        tree = ast.parse(file.read_text(encoding="utf-8"))
+        tree = ast.parse(Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError, SyntaxError):
         return None, {}
     for node in ast.walk(tree):
@@ -173,11 +174,12 @@ def families_of(trials: pd.DataFrame) -> list[Family]:
     found = []
     for name, selectors in _by_name(trials, "scenario").items():
         plugin = known.get(name)
+        text = plugin.factory.__doc__ or "" if plugin else _read(name)[0] if in_file(name) else None
         certified, variation = _certified(selectors[:MOST_CERTIFICATES], seed)
         found.append(
             Family(
                 name,
-                parse_docstring(plugin.documented.__doc__ or "") if plugin else None,
+                None if text is None else parse_docstring(text),
                 certified,
                 len(selectors) - len(certified),
                 variation,

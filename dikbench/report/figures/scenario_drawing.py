@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import make_scenario
+from dikbench.plugins.building import make_scenario
 from dikbench.problem.constraints import CollisionConstraint
 from dikbench.report.drawing.obstacle_surface import surface
 from dikbench.report.drawing.style import COLOURS, style

@@ -11,7 +11,7 @@ import pandas as pd
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.metrics import Motion, motion_of
-from dikbench.plugins.registry import make_scenario
+from dikbench.plugins.built_scenarios import built
 from dikbench.report.selection.rows import error_column, one_way, ranked
 from dikbench.results.folder import ResultsFolder
 from dikbench.simulation.trace import Trace
@@ -44,10 +44,12 @@ def stored_motions(folder: ResultsFolder, ran: pd.DataFrame, scenario: str) -> d
     if not files:
         return {}
     names = [name for name in ranked(rows, column) if name in files]
+    case = built(scenario, int(rows["seed"].iloc[0]))
+    if isinstance(case, str):  # the results are of another machine, which has more scenarios
+        return {}
     try:
-        case = make_scenario(scenario, int(rows["seed"].iloc[0]))
         return {name: motion_of(Trace.load(files[name]), case) for name in names}
-    except DikbenchError:  # the results are of another machine, which has more scenarios
+    except DikbenchError:  # the traces are of another version of the scenario
         return {}
 
 

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import pandas as pd
 
-from dikbench.plugins.registry import plugins
+from dikbench.plugins.finding import plugins
 from dikbench.report.sentences.words import listed, number, quoted, several
 from dikbench.scenario.oracle import ORACLE
 from dikbench.scenario.plant import PLANTS, REFERENCE_MODES

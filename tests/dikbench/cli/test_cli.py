@@ -14,7 +14,7 @@ import pytest
 
 from dikbench.cli.listing import listing
 from dikbench.metrics import METRICS
-from dikbench.plugins.registry import plugins
+from dikbench.plugins.finding import plugins
 
 FORMULATION = '''
 from __future__ import annotations
@@ -130,11 +130,7 @@ def test_a_plugin_of_another_project_is_listed_and_runs(tmp_path: Path) -> None:
     info.mkdir(parents=True)
     (site / "my_laws.py").write_text(FORMULATION + '\nFORMULATIONS = {"my-formulation": MyLaw}\n')
     (site / "my_scenarios.py").write_text(
-        "from scenarios.reach import reach\n"
-        "def my_family(distance: float = 0.05, *, seed: int = 0):\n"
-        '    """A short reach."""\n'
-        "    return reach(distance=distance, seed=seed)\n"
-        'SCENARIOS = {"my-family": my_family}\n'
+        'from scenarios.reach import Reach\nSCENARIOS = {"my-family": Reach(distance=0.05)}\n'
     )
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my-project\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text(

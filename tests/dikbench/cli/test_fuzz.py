@@ -20,7 +20,7 @@ import dikbench.report.write
 import dikbench.run.runner
 from dikbench import cli
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import make_formulation, scenario_parameters
+from dikbench.plugins.building import make_formulation, scenario_parameters
 from dikbench.solvers.catalogue.back_ends import parse_solver
 from dikbench.study.plan import expand
 from dikbench.study.study import Study, load_study

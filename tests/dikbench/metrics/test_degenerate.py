@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dikbench.metrics import METRICS, evaluate, motion_of
-from dikbench.plugins.registry import make_scenario
+from dikbench.plugins.building import make_scenario
 from dikbench.problem.tasks import OrientationTask, PositionTask
 from dikbench.scenario import Scenario
 from dikbench.scenario.reference.reference import target_at_rest

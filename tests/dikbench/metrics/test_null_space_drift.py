@@ -11,7 +11,7 @@ import pytest
 
 from dikbench.arrays import Array
 from dikbench.metrics import METRICS, Motion, motion_of
-from dikbench.plugins.registry import make_formulation, make_scenario
+from dikbench.plugins.building import make_formulation, make_scenario
 from dikbench.scenario import Scenario
 from dikbench.scenario.plant import Ideal
 from dikbench.scenario.reference.curves import circle

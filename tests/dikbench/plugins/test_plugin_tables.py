@@ -12,12 +12,8 @@ from typing import Any
 import pytest
 
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import (
-    make_formulation,
-    make_scenario,
-    plugins,
-    scenario_plugin,
-)
+from dikbench.plugins.building import make_formulation, make_scenario
+from dikbench.plugins.finding import plugins, scenario_plugin
 from formulations.damped_least_squares import DampedLeastSquares
 from formulations.pseudo_inverse import PseudoInverse
 from scenarios.reach import reach

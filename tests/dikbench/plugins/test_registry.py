@@ -9,12 +9,8 @@ from typing import Any
 import pytest
 
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import (
-    formulation_plugin,
-    make_formulation,
-    make_scenario,
-    plugins,
-)
+from dikbench.plugins.building import make_formulation, make_scenario
+from dikbench.plugins.finding import formulation_plugin, plugins
 from formulations.damped_least_squares import DampedLeastSquares
 from formulations.pseudo_inverse import PseudoInverse
 
@@ -103,8 +99,8 @@ def test_parameters_arrive_in_their_types() -> None:
         ("dsl", ["unknown formulation 'dsl'", "did you mean 'dls'?", "valid:", "path/to/file.py"]),
         ("dls[dampign=1]", ["parameter of formulation dls 'dampign'", "did you mean 'damping'?"]),
         ("dls[damping=much]", ["formulation dls: damping='much' is not valid", "float"]),
-        ("dls[damping=-1]", ["dls: damping must be finite and at least 0"]),
-        ("dls[damping=nan]", ["dls: damping must be finite and at least 0"]),
+        ("dls[damping=-1]", ["dls: damping=-1.0 must be finite and at least 0"]),
+        ("dls[damping=nan]", ["dls: damping=nan must be finite and at least 0"]),
         ("pinv[after=cilp]", ["pinv: after='cilp' is not valid", "valid: none, clip, scale"]),
         ("qp[braking=x]", ["valid: one-step, gain, sqrt, viable"]),
         ("qp[log_derivative=maybe]", ["log_derivative='maybe' is not valid", "bool"]),
@@ -126,7 +122,7 @@ def test_wrong_formulations_name_what_would_be_valid(text: str, parts: list[str]
         ("near-miss[robot=iiwa]", ["unknown robot 'iiwa'", "panda", "or give the path of a .urdf"]),
         ("reach[robot=pnada]", ["unknown robot 'pnada'", "did you mean 'panda'?"]),
         ("reach[seed=3]", ["the seed is not a parameter"]),
-        ("reach[dt=0]", ["scenario reach: dt=0.0 must be positive and finite"]),
+        ("reach[dt=0]", ["scenario reach: dt=0.0 must be finite and above 0"]),
     ],
 )
 def test_wrong_scenarios_name_what_would_be_valid(text: str, parts: list[str]) -> None:

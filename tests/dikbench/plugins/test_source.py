@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from dikbench.plugins.registry import Plugin
+from dikbench.plugins.finding import Plugin
 from dikbench.plugins.source import digest_of_file, source_digest
 
 CHECKOUT = Path(__file__).parents[3]
@@ -22,7 +22,7 @@ CHECKOUT = Path(__file__).parents[3]
 DIGESTS = """
 import json, sys
 from pathlib import Path
-from dikbench.plugins.registry import plugins
+from dikbench.plugins.finding import plugins
 from dikbench.plugins.source import digest_of_file, source_digest
 
 def digests():
@@ -61,7 +61,7 @@ print(json.dumps(found))
 
 FILES = """
 import json
-from dikbench.plugins.registry import plugins
+from dikbench.plugins.finding import plugins
 print(json.dumps({kind: {name: plugin.file for name, plugin in plugins(kind).items()}
                   for kind in ("formulation", "scenario")}))
 """

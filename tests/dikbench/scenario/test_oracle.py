@@ -9,7 +9,7 @@ import pandas as pd
 import pinocchio as pin
 import pytest
 
-from dikbench.plugins.registry import make_scenario
+from dikbench.plugins.building import make_scenario
 from dikbench.problem.tasks import PositionTask
 from dikbench.results.folder import ResultsFolder
 from dikbench.robots.catalogue import load_robot

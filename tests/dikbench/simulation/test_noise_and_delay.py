@@ -9,7 +9,7 @@ import pytest
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import make_plant
+from dikbench.plugins.building import make_plant
 from dikbench.problem import DikProblem, Solve
 from dikbench.problem.tasks import PoseTask
 from dikbench.robots.catalogue import load_robot

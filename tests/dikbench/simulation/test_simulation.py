@@ -17,7 +17,7 @@ import pytest
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError, Infeasible
 from dikbench.metrics import motion_of
-from dikbench.plugins.registry import make_formulation, make_scenario
+from dikbench.plugins.building import make_formulation, make_scenario
 from dikbench.problem import DikProblem, Formulation, Solve
 from dikbench.problem.tasks import PoseTask, PostureTask
 from dikbench.robots.catalogue import load_robot

@@ -7,7 +7,7 @@ import pytest
 
 from dikbench.arrays import Array
 from dikbench.errors import CannotAnswer
-from dikbench.plugins.registry import make_formulation, make_scenario
+from dikbench.plugins.building import make_formulation, make_scenario
 from dikbench.problem import DikProblem
 from dikbench.programs.quadratic_program import QuadraticProgram
 from dikbench.run.timing import record_problems

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from dikbench.errors import DikbenchError
-from dikbench.plugins.registry import make_scenario
+from dikbench.plugins.building import make_scenario
 from dikbench.selector import parse_selector
 from dikbench.study.identity import scenario_id
 from dikbench.study.plan import expand

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from dikbench.plugins.registry import make_scenario
+from dikbench.plugins.building import make_scenario
 from dikbench.problem.tasks import PoseTask, PositionTask, TrackingTogether
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics

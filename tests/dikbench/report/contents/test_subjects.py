@@ -6,7 +6,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from dikbench.plugins.registry import make_scenario, plugins
+from dikbench.plugins.building import make_scenario
+from dikbench.plugins.finding import plugins
 from dikbench.report.contents.docstring import parse_docstring
 from dikbench.report.contents.formulations_and_families import families_of, formulations_of
 from dikbench.report.selection.situations import (

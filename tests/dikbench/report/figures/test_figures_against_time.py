@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from dikbench.metrics import Motion, motion_of
-from dikbench.plugins.registry import make_formulation, make_scenario
+from dikbench.plugins.building import make_formulation, make_scenario
 from dikbench.report.drawing.style import style
 from dikbench.report.figures.every import draw_figures
 from dikbench.report.figures.joint_margins import draw_joint_margins, joint_margin
@@ -108,8 +108,8 @@ def test_margins_are_distances_to_the_nearest_limit(
     assert shown.keys() == set(LAWS)
     for number, formulation in enumerate(LAWS):
         margin = joint_margin(stored_motion(stored, number))
-        assert shown[law].get_ydata().min() == margin.min() < 0.0
-        assert shown[law].get_ydata()[0] == margin[0] > 0.0
+        assert shown[formulation].get_ydata().min() == margin.min() < 0.0
+        assert shown[formulation].get_ydata()[0] == margin[0] > 0.0
     assert (target / figure.png).is_file()
 
 

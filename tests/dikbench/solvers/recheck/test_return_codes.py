@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from dikbench.arrays import Array
-from dikbench.plugins.registry import make_scenario
+from dikbench.plugins.building import make_scenario
 from dikbench.problem import DikProblem, Solve
 from dikbench.programs.quadratic_program import Program, QuadraticProgram
 from dikbench.report.tables.return_codes import return_codes

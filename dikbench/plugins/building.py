@@ -1,0 +1,136 @@
+"""Selectors turned into objects: texts into typed values, values into a plug-in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, TypeVar
+
+import msgspec
+
+from dikbench.errors import DikbenchError, unknown
+from dikbench.parameters import Parameter, check_parameters, parameters_of
+from dikbench.plugins.finding import formulation_plugin, scenario_plugin
+from dikbench.problem.problem import Formulation
+from dikbench.scenario.family import Family
+from dikbench.scenario.plant import PLANTS, Plant
+from dikbench.scenario.scenario import Scenario
+from dikbench.selector import Selector, parse_selector
+
+Made = TypeVar("Made")
+
+
+def make_formulation(text: str | Selector) -> Formulation:
+    """Build a formulation from `name[parameter=value,...]` or `path/to/file.py:Class[...]`.
+
+    Raises:
+        DikbenchError: on an unknown name, file, class or parameter, or a value out of range.
+    """
+    selector = parse_selector(text)
+    plugin = formulation_plugin(selector.name)
+    make: Callable[..., Formulation] = partial(plugin.factory, **plugin.defaults)
+    return _built(f"formulation {plugin.name}", make, plugin.parameters, selector)
+
+
+def make_family(text: str | Selector) -> Family:
+    """Build a scenario family from `name[parameter=value,...]` or `path/to/file.py:Class[...]`.
+
+    Raises:
+        DikbenchError: on an unknown name, file, class or parameter, or a value out of range.
+    """
+    selector = parse_selector(text)
+    plugin = scenario_plugin(selector.name)
+    if "seed" in selector.parameters:
+        raise DikbenchError(f"scenario {str(selector)!r}: the seed is not a parameter; use --seed")
+    make: Callable[..., Family] = partial(plugin.factory, **plugin.defaults)
+    return _built(f"scenario {plugin.name}", make, plugin.parameters, selector)
+
+
+def make_scenario(text: str | Selector, seed: int = 0) -> Scenario:
+    """Build the scenario of a selector and a seed; its certificate is asserted.
+
+    Raises:
+        DikbenchError: on an unknown family or parameter, a value out of range, or a certificate
+            that does not hold.
+    """
+    family = make_family(text)
+    try:
+        return family.scenario(seed)
+    except MemoryError:
+        raise
+    except Exception as error:
+        raise DikbenchError(f"scenario {text}: {_reason(error)}") from error
+
+
+def make_plant(text: str | Selector) -> Plant:
+    """Build a plant from `ideal[noise=...,delay=...]` or `saturating[...]`.
+
+    Raises:
+        DikbenchError: on an unknown name or parameter, or a value out of range.
+    """
+    selector = parse_selector(text)
+    if selector.name not in PLANTS:
+        raise unknown("plant", selector.name, PLANTS)
+    plant = PLANTS[selector.name]
+    return _built(f"plant {selector.name}", plant, parameters_of(plant), selector)
+
+
+def scenario_parameters(text: str | Selector) -> Mapping[str, Any]:
+    """The parameters of a scenario's selector with their values, defaults among them.
+
+    Raises:
+        DikbenchError: on an unknown family or parameter, or a value of the wrong type or out of
+            range.
+    """
+    family = make_family(text)
+    return {name: getattr(family, name) for name in parameters_of(type(family))}
+
+
+def _built(
+    what: str,
+    make: Callable[..., Made],
+    parameters: Mapping[str, Parameter],
+    selector: Selector,
+) -> Made:
+    """Make an object with the selector's parameters and check them, also where it does not."""
+    values = _values(what, parameters, selector)
+    for name, parameter in parameters.items():
+        if parameter.required and name not in values:
+            raise DikbenchError(f"{what}: parameter {name!r} must be given")
+    try:
+        made = make(**values)
+        check_parameters(made)
+    except MemoryError:
+        raise
+    except Exception as error:
+        raise DikbenchError(f"{what}: {_reason(error)}") from error
+    return made
+
+
+def _values(what: str, parameters: Mapping[str, Parameter], selector: Selector) -> dict[str, Any]:
+    """Convert the selector's texts to the types that the parameters declare."""
+    values: dict[str, Any] = {}
+    for name, text in selector.parameters.items():
+        parameter = parameters.get(name)
+        if parameter is None:
+            raise _unknown_parameter(what, name, parameters)
+        try:
+            values[name] = msgspec.convert(text, parameter.type, strict=False)
+        except (msgspec.ValidationError, TypeError) as error:  # a TypeError: no text can give it
+            if parameter.hidden:
+                raise _unknown_parameter(what, name, parameters) from None
+            valid = f"valid: {parameter.valid}" if parameter.choices else str(error)
+            raise DikbenchError(f"{what}: {name}={text!r} is not valid: {valid}") from None
+    return values
+
+
+def _unknown_parameter(what: str, name: str, parameters: Mapping[str, Parameter]) -> DikbenchError:
+    offered = [other for other, parameter in parameters.items() if not parameter.hidden]
+    return unknown(f"parameter of {what}", name, offered)
+
+
+def _reason(error: Exception) -> str:
+    """Say an error in one line; of one that is not ours, its type as well."""
+    if isinstance(error, DikbenchError):
+        return str(error)
+    return f"{type(error).__name__}: {error}".partition("\n")[0]

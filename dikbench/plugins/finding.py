@@ -1,0 +1,194 @@
+"""Formulations and scenario families, found through entry points or in a file.
+
+An entry point in the group `dikbench.formulations` or `dikbench.scenarios` names a module that
+holds a table `FORMULATIONS` or `SCENARIOS`: name -> class, an instance of one (its values are the
+defaults then), or a `functools.partial` of one.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import importlib.util
+import inspect
+import os.path
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from functools import cached_property, lru_cache, partial
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Literal
+
+from dikbench.errors import DikbenchError, unknown
+from dikbench.parameters import Parameter, parameters_of
+from dikbench.scenario.family import Family
+
+Kind = Literal["formulation", "scenario"]
+
+
+@dataclass(frozen=True)
+class Plugin:
+    """A formulation or a scenario family as it was registered.
+
+    Attributes:
+        name: the name in the table.
+        factory: the class, which carries the docstring and declares the parameters.
+        file: the file that it comes from.
+        defaults: values that stand in for the defaults of the class.
+    """
+
+    name: str
+    factory: type
+    file: str
+    defaults: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def summary(self) -> str:
+        """The first line of its docstring."""
+        return (inspect.getdoc(self.factory) or "").partition("\n")[0]
+
+    @property
+    def source(self) -> str:
+        """The paragraph `Source: ...` of its docstring, on one line."""
+        return self.paragraph("Source")
+
+    def paragraph(self, title: str) -> str:
+        """The paragraph `title: ...` of its docstring, on one line; empty where there is none."""
+        _, _, text = (inspect.getdoc(self.factory) or "").partition(f"{title}: ")
+        return " ".join(text.partition("\n\n")[0].split()).rstrip(".")
+
+    @cached_property
+    def parameters(self) -> Mapping[str, Parameter]:
+        """Its parameters, with their defaults."""
+        return {
+            name: replace(parameter, default=self.defaults.get(name, parameter.default))
+            for name, parameter in parameters_of(self.factory).items()
+        }
+
+
+@lru_cache
+def plugins(kind: Kind) -> Mapping[str, Plugin]:
+    """Find every registered plug-in of a kind, by name.
+
+    Raises:
+        DikbenchError: if there is none (dikbench is not installed), a module has no table, an entry
+            is no plug-in, or two share a name.
+    """
+    group = f"dikbench.{kind}s"
+    found: dict[str, Plugin] = {}
+    for entry_point in importlib.metadata.entry_points(group=group):
+        where = f"plug-in {entry_point.name!r} of {group}"
+        try:
+            module = entry_point.load()
+        except Exception as error:
+            raise DikbenchError(
+                f"{where} ({entry_point.value}) cannot be imported: {type(error).__name__}: {error}"
+            ) from error
+        file = getattr(module, "__file__", None) or repr(module)
+        table = getattr(module, f"{kind.upper()}S", None)
+        if not isinstance(table, Mapping):
+            raise DikbenchError(f"{where}: {file} holds no mapping {kind.upper()}S")
+        for name, entry in table.items():
+            plugin = _registered(kind, name, entry, file)
+            if found.setdefault(plugin.name, plugin) != plugin:
+                raise DikbenchError(
+                    f"two plug-ins are called {name!r}: {found[name].file} and {plugin.file}"
+                )
+    if not found:
+        raise DikbenchError(
+            f"no {kind}s are registered: dikbench is not installed here; "
+            "run pip install -e . in its checkout"
+        )
+    return found
+
+
+def formulation_plugin(name: str) -> Plugin:
+    """Find the plug-in behind a formulation's name or `path/to/file.py:Class`."""
+    return _plugin("formulation", name)
+
+
+def scenario_plugin(name: str) -> Plugin:
+    """Find the plug-in behind a scenario family's name or `path/to/file.py:Class`."""
+    return _plugin("scenario", name)
+
+
+def in_file(name: str) -> bool:
+    """Whether a selector's name is `path/to/file.py:Class`."""
+    return name.rpartition(":")[0].endswith(".py")
+
+
+def kind_in_file(name: str) -> Kind:
+    """Whether a class that is given as `path/to/file.py:Class` is a formulation or a family."""
+    path, _, class_name = name.rpartition(":")
+    found = _class_from_file("formulation", path, class_name)
+    return "scenario" if issubclass(found, Family) else "formulation"
+
+
+def _plugin(kind: Kind, name: str) -> Plugin:
+    if in_file(name):
+        path, _, class_name = name.rpartition(":")
+        return _registered(kind, class_name, _class_from_file(kind, path, class_name), path)
+    known = plugins(kind)
+    if name not in known:
+        raise unknown(kind, name, known, "(or give path/to/file.py:Class)")
+    return known[name]
+
+
+def _registered(kind: Kind, name: object, entry: Any, file: str) -> Plugin:
+    """Check an entry of a table, or a class of a file, and take it apart."""
+    if not isinstance(name, str) or not name or set(name) & set("[],= \t\n"):
+        raise DikbenchError(f"{file}: {name!r} is not a name (no brackets, commas or spaces)")
+    factory, defaults = entry, {}
+    if isinstance(entry, partial):
+        factory = entry.func
+    elif is_dataclass(entry) and not isinstance(entry, type):
+        factory = type(entry)
+        defaults = {own.name: getattr(entry, own.name) for own in fields(entry) if own.init}
+    where = f"{file}: {kind} {name!r}"
+    if not isinstance(factory, type):
+        raise DikbenchError(f"{where} is no class, nor an instance of one")
+    if kind == "formulation" and not callable(getattr(factory, "velocity", None)):
+        raise DikbenchError(f"{where} has no method velocity(problem, solve)")
+    if kind == "scenario" and not issubclass(factory, Family):
+        raise DikbenchError(f"{where} is not derived from dikbench.scenario.Family")
+    try:
+        parameters = parameters_of(factory)
+    except DikbenchError as error:
+        raise DikbenchError(f"{where}: {error}") from None
+    if isinstance(entry, partial):
+        defaults = {**dict(zip(parameters, entry.args, strict=False)), **entry.keywords}
+    try:
+        file = inspect.getsourcefile(factory) or file
+    except TypeError:
+        pass
+    return Plugin(name, factory, file, defaults)
+
+
+def _class_from_file(kind: Kind, path: str, class_name: str) -> type:
+    """Take a class out of a file that the user named on the command line."""
+    module = _module_from_file(kind, path)
+    found = getattr(module, class_name, None)
+    if not isinstance(found, type):
+        own = [value for value in vars(module).values() if isinstance(value, type)]
+        classes = [value.__name__ for value in own if value.__module__ == module.__name__]
+        raise unknown("class", class_name, classes, f"in {path}")
+    return found
+
+
+@lru_cache
+def _module_from_file(kind: Kind, path: str) -> ModuleType:
+    file = Path(path)
+    if not os.path.isfile(path):  # unlike Path.is_file, False for a name that is too long
+        raise DikbenchError(f"{kind} file not found: {path}")
+    spec = importlib.util.spec_from_file_location(f"dikbench_user_{file.stem}", file)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclasses and pickle look it up there
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise DikbenchError(
+            f"{kind} file {path} cannot be imported: {type(error).__name__}: {error}"
+        ) from error
+    return module

@@ -1,0 +1,160 @@
+"""A scenario family: a frozen dataclass whose fields are the parameters of its scenarios."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+from dikbench.arrays import Array
+from dikbench.parameters import Parameters, Range, parameters_of
+from dikbench.problem.constraints import Constraint
+from dikbench.problem.tasks import PoseTask, Task, TrackingTask
+from dikbench.robots.catalogue import load_robot
+from dikbench.robots.robot import Robot
+from dikbench.scenario.building import (
+    limits_in_force,
+    samples,
+    secondary_tasks,
+    start_velocity,
+)
+from dikbench.scenario.certificate import Certificate, Claim
+from dikbench.scenario.oracle import POSE, OracleMotion, oracle_motion
+from dikbench.scenario.reference.reference import Reference
+from dikbench.scenario.scenario import Scenario, first_level
+from dikbench.scenario.variation import NO_VARIATION, Perturbation, Variation
+
+Gain = Annotated[float, Range(above=0.0, unit="1/s")]
+"""Of a task: the desired velocity per error."""
+
+Time = Annotated[float, Range(above=0.0, unit="s")]
+"""A control period, or how long something lasts."""
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """What is a family's own of a scenario; what is None is filled in by `Family.scenario`.
+
+    Attributes:
+        reference: the desired motion of the task frame.
+        q0: configuration at the start, (nq,).
+        motion: the joint motion that follows the reference exactly; None where none does.
+        claims: what makes the scenario what it is.
+        robot: the robot with its limits in force; default: the one that the case was made with.
+        tracking: the task that follows the reference; default: the whole pose.
+        v0: joint velocity at the start, (nv,) [rad/s or m/s]; default: the reference's own.
+        tasks: other tasks; default: to hold the posture q0 in the null space, where there is one.
+        duration: length of a time-indexed run [s]; default: the reference's.
+        constraints: what must hold in addition to the joint limits.
+    """
+
+    reference: Reference
+    q0: Array
+    motion: OracleMotion | None
+    claims: tuple[Claim, ...]
+    robot: Robot | None = None
+    tracking: TrackingTask | None = None
+    v0: Array | None = None
+    tasks: tuple[Task, ...] | None = None
+    duration: float | None = None
+    constraints: tuple[Constraint, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Family(Parameters, ABC):
+    """Scenarios that differ in parameters; a subclass adds its own and says what a case is.
+
+    A field that a subclass gives one value only (`frame: None = None`) is fixed and hidden.
+    Paragraphs `Provokes: ...`, `Shows in: ...` and `Source: ...` of the docstring are listed.
+
+    Attributes:
+        robot: a robot's name, or the path of a URDF.
+        frame: the task frame; default: the robot's.
+        gain: of the tracking task.
+        dt: control period.
+        acceleration: whether acceleration limits are in force.
+        robots: on which the defaults are certified, where the family takes any.
+        variation: what a seed perturbs, and within which ranges.
+        swept: parameters against which figures may be drawn; their units are those of the ranges.
+        grid: the two parameters, across and up, that span a phase diagram.
+        about_position_limits: whether figures show the distance to the position limits.
+    """
+
+    robot: str = "panda"
+    frame: str | None = None
+    gain: Gain = 5.0
+    dt: Time = 0.01
+    acceleration: bool = False
+
+    robots: ClassVar[tuple[str, ...]] = ()
+    variation: ClassVar[Variation] = NO_VARIATION
+    swept: ClassVar[tuple[str, ...]] = ()
+    grid: ClassVar[tuple[str, str] | None] = None
+    about_position_limits: ClassVar[bool] = False
+
+    @abstractmethod
+    def case(self, robot: Robot, change: Perturbation) -> Case:
+        """Make what is the family's own of a scenario.
+
+        Args:
+            robot: the robot that `robot` and `frame` name, with its limits in force.
+            change: what the seed perturbs; seed 0 perturbs nothing.
+
+        Raises:
+            DikbenchError: if there is no such case; the message need not name the family.
+        """
+
+    def scenario(self, seed: int = 0) -> Scenario:
+        """Make the scenario of a seed, and assert its certificate.
+
+        Raises:
+            DikbenchError: if there is none with these parameters, or a claim does not hold.
+        """
+        change = self.variation.drawn(seed)
+        arm = limits_in_force(load_robot(self.robot, self.frame), acceleration=self.acceleration)
+        case = self.case(arm, change)
+        robot = arm if case.robot is None else case.robot
+        tracking, tasks, v0 = case.tracking, case.tasks, case.v0
+        if tracking is None:
+            tracking = PoseTask(gain=self.gain)
+        if tasks is None:
+            tasks = secondary_tasks(robot, case.q0, tracking)
+        if v0 is None:
+            v0 = start_velocity(robot, case.reference, case.q0, first_level(tracking, tasks))
+        made = Scenario(
+            robot=robot,
+            q0=case.q0,
+            v0=v0,
+            reference=case.reference,
+            tracking=tracking,
+            dt=self.dt,
+            duration=case.reference.duration if case.duration is None else case.duration,
+            certificate=Certificate(case.claims),
+            tasks=tasks,
+            motion=case.motion,
+            variation=self.variation,
+            constraints=case.constraints,
+        )
+        made.certificate.check()
+        return made
+
+    def exact_motion(
+        self,
+        robot: Robot,
+        reference: Reference,
+        q0: Array,
+        tracking: TrackingTask = POSE,
+        most: int = 200,
+    ) -> OracleMotion:
+        """Follow a reference exactly from q0 (nq,), at every control step, or `most` of them.
+
+        Raises:
+            DikbenchError: if a sample cannot be reached.
+        """
+        instants = samples(reference.duration, self.dt, most)
+        return oracle_motion(robot, reference, q0, instants, tracking)
+
+
+def certified_robots(family: type[Family]) -> tuple[str, ...]:
+    """Robots on which a family's defaults are certified: those of its type, else its `robots`."""
+    return parameters_of(family)["robot"].choices or family.robots
