@@ -84,6 +84,7 @@ class StartedPlant:
         return read_only(self._plant.drive(self._arriving.popleft(), limits, self._dt))
 
 
+@dataclass(frozen=True)
 class Ideal(Plant):
     """Applies whatever is commanded, limits or not: shows violations."""
 
@@ -92,6 +93,7 @@ class Ideal(Plant):
         return v
 
 
+@dataclass(frozen=True)
 class Saturating(Plant):
     """Clips each joint to its velocity and position limits: shows going off course."""
 
