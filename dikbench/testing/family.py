@@ -33,7 +33,7 @@ FamilyCheck = Callable[[Family], None]
 def check_family_declaration(family: Family) -> None:
     """Check that the family is a frozen dataclass, derived from `Family`, and says what it is."""
     name = type(family).__name__
-    parameters = getattr(family, "__dataclass_params__", None)
+    parameters: Any = getattr(family, "__dataclass_params__", None)
     if not isinstance(family, Family) or not is_dataclass(family) or not parameters.frozen:
         raise AssertionError(
             f"{name} is not an instance of a class with @dataclass(frozen=True) that is derived "

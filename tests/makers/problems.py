@@ -84,9 +84,7 @@ def solve_for(formulation: Formulation, solver: str = "daqp") -> CheckedSolve:
     return make_solve(None if program is None else parse_solver(solver), program)
 
 
-def velocity_of(
-    formulation: str | Formulation, problem: DikProblem, solver: str = "daqp"
-) -> Array:
+def velocity_of(formulation: str | Formulation, problem: DikProblem, solver: str = "daqp") -> Array:
     """What a formulation answers; it may raise `CannotAnswer`."""
     law = make_formulation(formulation) if isinstance(formulation, str) else formulation
     solve = solve_for(law, solver)
@@ -121,14 +119,14 @@ def limits_at_distances(
         nv=n,
         q_index=np.arange(n),
         position=Interval(-below, above),
-        velocity=_interval(velocity, n),
-        acceleration=_interval(acceleration, n),
+        velocity=interval_of(velocity, n),
+        acceleration=interval_of(acceleration, n),
         effort=None,
     )
     return joint.at(np.zeros(n))
 
 
-def _interval(value: object, n: int) -> Interval | None:
+def interval_of(value: object, n: int) -> Interval | None:
     """A pair (lower, upper), a symmetric magnitude, or None."""
     if value is None:
         return None
