@@ -92,9 +92,8 @@ def _outside(parameter: Parameter) -> list[float]:
     assert parameter.range is not None
     for end, away in ((parameter.range.low, -1.0), (parameter.range.high, 1.0)):
         if isfinite(end):
-            found.append(
-                end + away if _is_of(parameter, int) else end + away * max(1e-6, 1e-6 * abs(end))
-            )
+            step = 1.0 if _is_of(parameter, int) else max(1e-6, 1e-6 * abs(end))
+            found.append(end + away * step)
     return [value for value in found if not parameter.range.holds(value)]
 
 

@@ -222,9 +222,7 @@ def test_honest_family_passes() -> None:
 def test_what_is_no_family_is_named() -> None:
     """A class that is not derived from `Family` is none, whatever it can do."""
     pretender: Any = Variation()
-    with pytest.raises(
-        AssertionError, match=r"Variation is not an instance .*dikbench\.scenario\.Family"
-    ):
+    with pytest.raises(AssertionError, match=r"Variation is not an instance .*scenario\.Family"):
         check_family(pretender)
 
 
