@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
-from makers.scenarios import metrics_of, put_robot, scenario_error
+from makers.scenarios import TWENTY_SEEDS, metrics_of, put_robot, scenario_error
 
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_scenario
@@ -48,10 +48,11 @@ def test_it_rests_between_the_legs_and_while_it_grasps() -> None:
         assert np.abs(reference.velocity(share * reference.duration)).max() > 0.05
 
 
+@pytest.mark.parametrize("seeds", TWENTY_SEEDS, ids=["few", "many"])
 @pytest.mark.parametrize("robot", PickAndPlace.robots)
-def test_every_arm_does_it_from_twenty_starts(robot: str) -> None:
+def test_every_arm_does_it_from_twenty_starts(robot: str, seeds: range) -> None:
     """The certificate holds (building asserts it), and the oracle is where the reference is."""
-    for seed in range(21):
+    for seed in seeds:
         scenario = make_scenario(f"pick-and-place[robot={robot}]", seed)
         motion, kinematics = scenario.motion, Kinematics(scenario.robot)
         assert motion is not None
