@@ -20,7 +20,7 @@ SUBJECTS = ("formulations", "scenarios", "solvers", "robots", "metrics", "studie
 def main() -> None:
     """Run the command line; a wrong option is one line as well."""
     try:
-        sys.exit(commands.main(standalone_mode=False))
+        sys.exit(commands.main(prog_name="dikbench", standalone_mode=False))
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())
         sys.exit(2)
@@ -103,11 +103,13 @@ def study_options(command: Callable[..., None]) -> Callable[..., None]:
     return command
 
 
-def _selected(study: str | None, axes: dict[str, Any]) -> Any:
-    """The study that the options select."""
-    from dikbench.study.study import DEFAULT_STUDY, Selection, load_study, select
+def _selected(study: str | None, axes: dict[str, Any], out: Path | None) -> tuple[Any, Path]:
+    """Return the study that the options select, and its results folder."""
+    from dikbench.cli.running import results_folder, selected
+    from dikbench.study.study import Selection
 
-    return select(load_study(study or DEFAULT_STUDY), Selection(**axes), named=study is not None)
+    chosen = selected(study, Selection(**axes))
+    return chosen, results_folder(chosen, out)
 
 
 @commands.command()
@@ -167,8 +169,7 @@ def run(
     from dikbench.run.pool import available_cores
     from dikbench.run.runner import Interrupted, RunSettings, run_study
 
-    selected = _selected(study, axes)
-    folder = out or Path("runs") / selected.name
+    selected, folder = _selected(study, axes, out)
     command = shlex.join(["dikbench", *sys.argv[1:]])
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a stop like Ctrl-C
     settings = RunSettings(jobs or available_cores(), trial_timeout, trial_memory, traces, rerun)
@@ -191,8 +192,7 @@ def time(study: str | None, out: Path | None, **axes: Any) -> None:
     from dikbench.report.write import write_times
     from dikbench.run.runner import Interrupted, time_study
 
-    selected = _selected(study, axes)
-    folder = out or Path("runs") / selected.name
+    selected, folder = _selected(study, axes, out)
     command = shlex.join(["dikbench", *sys.argv[1:]])
     try:
         time_study(selected, folder, command)

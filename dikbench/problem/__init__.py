@@ -50,9 +50,10 @@ from dikbench.problem.tasks import (
 )
 from dikbench.problem.tasks.orientation import LinearizedOrientation
 from dikbench.problem.tasks.task import LinearizedJointTask, LinearizedTask
-from dikbench.problem.velocity_box import Box, Braking, sqrt_brake
+from dikbench.problem.velocity_box import Box, Braking
 from dikbench.programs.modelled_program import ModelledProgram
 from dikbench.programs.quadratic_program import Program, QuadraticProgram
+from dikbench.robots.braking import sqrt_brake, viable_brake
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.limits import Interval, Limits
 from dikbench.robots.robot import Robot
@@ -107,5 +108,6 @@ __all__ = [
     "solve_positive_definite",
     "sqrt_brake",
     "thin_svd",
+    "viable_brake",
     "volume",
 ]

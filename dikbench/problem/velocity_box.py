@@ -31,21 +31,21 @@ import numpy as np
 
 from dikbench.arrays import Array
 from dikbench.errors import unknown
+from dikbench.robots.braking import (
+    LEAST_DECELERATION_RAD_S2,
+    UNBRAKED_DISTANCE_RAD,
+    sqrt_brake,
+    viable_brake,
+)
 from dikbench.robots.limits import JointLimits, Limits
 
 Braking = Literal["one-step", "gain", "sqrt", "viable"]
 BRAKINGS: Final = get_args(Braking)
 
-FAR: Final = 1e6
-"""Distance [rad] from which a position limit brakes nothing: infinity stays out of the formulas."""
-
-CONFLICT: Final = 1e-9
+ROUNDING_SPEED_RAD_S: Final = 1e-9
 """A bound given up by less than this [rad/s] is rounding, not a relaxation."""
 
-WEAKEST: Final = 1e-9
-"""Deceleration [rad/s^2] below which a joint counts as having none (keeps k finite)."""
-
-HAIR: Final = 1e-9
+ROUNDING_SHARE: Final = 1e-9
 """Share of a distance, and distance [rad], by which rounding cannot bring a limit nearer."""
 
 
@@ -190,36 +190,14 @@ def _reach(speed: Array, deceleration: Array, dt: float, braking: Braking, gain:
     elif braking == "one-step":
         distance = speed * dt
     else:
-        slow = np.maximum(deceleration, WEAKEST)
+        slow = np.maximum(deceleration, LEAST_DECELERATION_RAD_S2)
         if braking == "sqrt":
             distance = speed**2 / (2 * slow)
         else:
             k = np.floor(speed / (slow * dt))
             distance = dt * ((k + 1) * speed - np.where(k > 0, slow, 0.0) * dt * k * (k + 1) / 2)
-        distance = np.maximum(speed * dt, np.minimum(distance, FAR))
-    return distance * (1 + HAIR) + HAIR
-
-
-def viable_brake(distance: Array, deceleration: Array, dt: float) -> Array:
-    """Largest speed [rad/s] towards a limit at `distance` [rad] from which a joint can still stop.
-
-    Exact for q+ = q + v dt: braking by deceleration * dt per step it comes to rest on the limit or
-    before it. Infinite where the distance or the deceleration is; 0 outside the limit.
-    """
-    braked = (distance < FAR) & np.isfinite(deceleration)
-    d = np.where(braked, np.maximum(distance, 0.0), 0.0)
-    step = np.where(braked, np.maximum(deceleration, WEAKEST), 1.0) * dt
-    k = np.floor(-0.5 + np.sqrt(0.25 + 2 * d / (step * dt)))
-    speed = (d / dt + step * k * (k + 1) / 2) / (k + 1)
-    return np.where(braked, speed, np.inf)
-
-
-def sqrt_brake(distance: Array, deceleration: Array, dt: float) -> Array:
-    """Continuous-time braking speed sqrt(2 a d) [rad/s], a the deceleration, d the distance."""
-    del dt  # the continuous-time bound does not know the control period
-    braked = (distance < FAR) & np.isfinite(deceleration)
-    d = np.where(braked, np.maximum(distance, 0.0), 0.0)
-    return np.where(braked, np.sqrt(2 * np.where(braked, deceleration, 0.0) * d), np.inf)
+        distance = np.maximum(speed * dt, np.minimum(distance, UNBRAKED_DISTANCE_RAD))
+    return distance * (1 + ROUNDING_SHARE) + ROUNDING_SHARE
 
 
 BRAKES: Final[Mapping[str, Callable[[Array, Array, float], Array]]] = MappingProxyType(
@@ -248,7 +226,7 @@ def _ask_for_the_way_back(
 def _with_acceleration(lower: Array, upper: Array, slowest: Array, fastest: Array) -> Box:
     """Intersect with [slowest, fastest]; where that is empty, take the nearest velocity allowed."""
     gap = np.maximum(slowest - upper, lower - fastest)
-    relaxed = int(np.count_nonzero(gap > CONFLICT))
+    relaxed = int(np.count_nonzero(gap > ROUNDING_SPEED_RAD_S))
     return Box(
         np.clip(slowest, lower, upper),
         np.clip(fastest, lower, upper),

@@ -5,8 +5,10 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import ModuleType
 from typing import Final
 
 from pebble import ProcessPool
@@ -35,6 +37,10 @@ def workers(
         memory: what each may take beyond its start [MB], where the system can limit it; None: any.
     """
     before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
+    main = sys.modules["__main__"]
+    # A new process would import the script that was started: without `if __name__ == "__main__"` in
+    # it, it would begin to run the study as well.
+    sys.modules["__main__"] = ModuleType("__main__")
     os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
     pool = ProcessPool(
         max_workers=count,
@@ -50,6 +56,7 @@ def workers(
         raise
     finally:
         pool.join()
+        sys.modules["__main__"] = main
         for name, value in before.items():
             if value is None:
                 os.environ.pop(name, None)

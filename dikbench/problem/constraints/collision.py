@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.problem.velocity_box import viable_brake
+from dikbench.robots.braking import viable_brake
 from dikbench.robots.collision.obstacles import Obstacle
 from dikbench.robots.collision.pairs import CollisionPairs
 from dikbench.robots.kinematics import Kinematics
@@ -47,7 +47,7 @@ class CollisionConstraint:
     leave no velocity: an infeasible step. Farther than the influence distance, or where no joint
     changes the distance to first order, the row is vacuous: 0 v <= 1.
 
-    Where acceleration limits are in force the row brakes as `velocity_box.viable_brake` does,
+    Where acceleration limits are in force the row brakes as `viable_brake` does,
     counting on half of what they allow, 0.5 sum_i |g_i| a_i [m/s^2], and asks for no more change
     of g . v in this step than that; a distance that is missed by joints that brake so slowly, or
     that had no row early enough, then falls below the margin.

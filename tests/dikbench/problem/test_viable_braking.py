@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dikbench.arrays import Array
-from dikbench.problem.velocity_box import Braking, sqrt_brake, velocity_box, viable_brake
+from dikbench.problem.velocity_box import Braking, velocity_box
+from dikbench.robots.braking import sqrt_brake, viable_brake
 from dikbench.robots.limits import Interval, JointLimits, Limits
 
 periods = st.floats(5e-4, 0.05)

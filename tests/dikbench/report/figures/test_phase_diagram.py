@@ -14,7 +14,7 @@ from matplotlib.collections import QuadMesh
 from dikbench.report.drawing.style import style
 from dikbench.report.figures.phase_diagram import draw_phase_diagrams, three_digits
 from dikbench.report.selection.categories import CATEGORIES, categories
-from dikbench.report.selection.near_miss_grids import near_miss_grids
+from dikbench.report.selection.phase_grids import phase_grids
 
 MakeTrials = Callable[..., pd.DataFrame]
 
@@ -109,9 +109,9 @@ def test_laws_stand_in_the_order_of_how_they_do(
 
 def test_a_row_of_near_misses_is_no_grid(make_trials: MakeTrials) -> None:
     """Two misses at two speeds are a grid, three misses at one speed are none."""
-    assert len(near_miss_grids(make_trials(["dls"], GRID[:4]))) == 1
-    assert not near_miss_grids(make_trials(["dls"], GRID[::2]))
-    assert not near_miss_grids(make_trials(["dls"], ["near-miss", "reach[miss=1,speed=1]"]))
+    assert len(phase_grids(make_trials(["dls"], GRID[:4]))) == 1
+    assert not phase_grids(make_trials(["dls"], GRID[::2]))
+    assert not phase_grids(make_trials(["dls"], ["near-miss", "reach[miss=1,speed=1]"]))
 
 
 def test_many_laws_make_several_pages(

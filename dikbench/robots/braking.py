@@ -1,0 +1,37 @@
+"""How fast a joint may approach a limit and still brake before it."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from dikbench.arrays import Array
+
+UNBRAKED_DISTANCE_RAD: Final = 1e6
+"""Distance from which a position limit brakes nothing: infinity stays out of the formulas."""
+
+LEAST_DECELERATION_RAD_S2: Final = 1e-9
+"""Deceleration below which a joint counts as having none; it keeps step counts finite."""
+
+
+def viable_brake(distance: Array, deceleration: Array, dt: float) -> Array:
+    """Compute the largest speed [rad/s] towards a limit at `distance` [rad] from which a joint can still stop.
+
+    Exact for q+ = q + v dt: braking by deceleration * dt per step it comes to rest on the limit or
+    before it. Infinite where the distance or the deceleration is; 0 outside the limit.
+    """
+    braked = (distance < UNBRAKED_DISTANCE_RAD) & np.isfinite(deceleration)
+    d = np.where(braked, np.maximum(distance, 0.0), 0.0)
+    step = np.where(braked, np.maximum(deceleration, LEAST_DECELERATION_RAD_S2), 1.0) * dt
+    k = np.floor(-0.5 + np.sqrt(0.25 + 2 * d / (step * dt)))
+    speed = (d / dt + step * k * (k + 1) / 2) / (k + 1)
+    return np.where(braked, speed, np.inf)
+
+
+def sqrt_brake(distance: Array, deceleration: Array, dt: float) -> Array:
+    """Compute the continuous-time braking speed sqrt(2 a d) [rad/s], a the deceleration, d the distance."""
+    del dt  # the continuous-time bound does not know the control period
+    braked = (distance < UNBRAKED_DISTANCE_RAD) & np.isfinite(deceleration)
+    d = np.where(braked, np.maximum(distance, 0.0), 0.0)
+    return np.where(braked, np.sqrt(2 * np.where(braked, deceleration, 0.0) * d), np.inf)
