@@ -256,25 +256,17 @@ def _read(plugin: type, field: dataclasses.Field[Any]) -> Parameter:
         _marker(hints, Range) if numeric else None,
         _marker(hints, Drawn),
     )
+    problem = "its default"
     try:
         if not parameter.required:
             parameter.check(default)
-        _check_drawn(parameter, numeric)
+        problem = "Drawn:"
+        if parameter.drawn is not None and numeric:
+            for bound in (parameter.drawn.low, parameter.drawn.high):
+                parameter.check(bound)
     except DikbenchError as error:
-        raise DikbenchError(f"class {plugin.__qualname__}: the default or Drawn {error}") from None
+        raise DikbenchError(f"class {plugin.__qualname__}: {problem} {error}") from None
     return parameter
-
-
-def _check_drawn(parameter: Parameter, numeric: bool) -> None:
-    drawn = parameter.drawn
-    if drawn is None:
-        return
-    if isnan(drawn.low):
-        if numeric:
-            raise DikbenchError(f"of {parameter.name} needs finite bounds")
-        return
-    for bound in (drawn.low, drawn.high):
-        parameter.check(bound)
 
 
 def _hints(plugin: type, name: str) -> Iterator[Any]:

@@ -113,20 +113,14 @@ def _values(what: str, parameters: Mapping[str, Parameter], selector: Selector) 
     for name, text in selector.parameters.items():
         parameter = parameters.get(name)
         if parameter is None:
-            raise _unknown_parameter(what, name, parameters)
+            offered = [other for other, known in parameters.items() if not known.hidden]
+            raise unknown(f"parameter of {what}", name, offered)
         try:
             values[name] = msgspec.convert(text, parameter.type, strict=False)
         except (msgspec.ValidationError, TypeError) as error:  # a TypeError: no text can give it
-            if parameter.hidden:
-                raise _unknown_parameter(what, name, parameters) from None
             valid = f"valid: {parameter.valid}" if parameter.choices else str(error)
             raise DikbenchError(f"{what}: {name}={text!r} is not valid: {valid}") from None
     return values
-
-
-def _unknown_parameter(what: str, name: str, parameters: Mapping[str, Parameter]) -> DikbenchError:
-    offered = [other for other, parameter in parameters.items() if not parameter.hidden]
-    return unknown(f"parameter of {what}", name, offered)
 
 
 def _reason(error: Exception) -> str:

@@ -128,7 +128,7 @@ def test_selectors_stand_in_the_trial_as_they_were_given() -> None:
         (('"dls"', '"dls[damp=1]"'), ("damp", "valid: damping")),
         (('"dls"', '"qp"'), ("qp", "needs a solver")),
         (('"reach"', '"reech"'), ("reech", "did you mean 'reach'")),
-        (('"reach"', '"reach[distance=7]"'), ("distance=7", "between")),
+        (('"reach"', '"reach[distance=7]"'), ("distance=7", "0.01 to 0.3 [m]")),
         (('"reach"', '"reach[robot=ur55]"'), ("ur55", "did you mean 'ur5'")),
         (("description", "seeds = [-1]\ndescription"), ("seeds",)),
         (("description", 'plants = ["perfect"]\ndescription'), ("perfect", "plant")),

@@ -96,11 +96,11 @@ def test_variants_of_a_law_stand_together_with_every_attribute(make_rows: MakeRo
 def test_every_shipped_docstring_is_taken_apart(kind: str) -> None:
     """Nothing of a docstring is lost: each of its words stands in one of the parts."""
     for plugin in plugins(kind).values():
-        text = plugin.documented.__doc__ or ""
+        text = plugin.factory.__doc__ or ""
         parsed = parse_docstring(text)
         assert parsed.summary == plugin.summary
         assert "Source" in parsed.titled
-        assert set(parsed.entries) >= {name for name in plugin.parameters if f"{name}:" in text}, (
+        assert set(parsed.entries) >= {name for name in plugin.parameters if f" {name}:" in text}, (
             plugin.name
         )
         parts = [
