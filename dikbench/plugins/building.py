@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 import msgspec
 
@@ -84,6 +84,27 @@ def scenario_parameters(text: str | Selector) -> Mapping[str, Any]:
     """
     family = make_family(text)
     return {name: getattr(family, name) for name in parameters_of(type(family))}
+
+
+def in_declared_order(
+    kind: Literal["formulation", "scenario", "plant"], text: str | Selector
+) -> Selector:
+    """Parse a selector and put its parameters in the order in which its class declares them.
+
+    What is written in another order is then the same text. A selector that names nothing valid
+    stays as it is: who builds from it says why.
+
+    Raises:
+        DikbenchError: if the text is no selector.
+    """
+    selector = parse_selector(text)
+    try:
+        if kind == "plant":
+            return selector.ordered(parameters_of(PLANTS[selector.name]))
+        find = formulation_plugin if kind == "formulation" else scenario_plugin
+        return selector.ordered(find(selector.name).parameters)
+    except (DikbenchError, KeyError):
+        return selector
 
 
 def _built(

@@ -16,7 +16,7 @@ LEAST_DECELERATION_RAD_S2: Final = 1e-9
 
 
 def viable_brake(distance: Array, deceleration: Array, dt: float) -> Array:
-    """Compute the largest speed [rad/s] towards a limit at `distance` [rad] from which a joint can still stop.
+    """Compute the largest speed [rad/s] at `distance` [rad] from a limit that can still be stopped.
 
     Exact for q+ = q + v dt: braking by deceleration * dt per step it comes to rest on the limit or
     before it. Infinite where the distance or the deceleration is; 0 outside the limit.
@@ -30,7 +30,7 @@ def viable_brake(distance: Array, deceleration: Array, dt: float) -> Array:
 
 
 def sqrt_brake(distance: Array, deceleration: Array, dt: float) -> Array:
-    """Compute the continuous-time braking speed sqrt(2 a d) [rad/s], a the deceleration, d the distance."""
+    """Compute sqrt(2 a d) [rad/s], the braking speed in continuous time, a the deceleration."""
     del dt  # the continuous-time bound does not know the control period
     braked = (distance < UNBRAKED_DISTANCE_RAD) & np.isfinite(deceleration)
     d = np.where(braked, np.maximum(distance, 0.0), 0.0)

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from types import MappingProxyType
+from typing import Annotated, Any, Final, Literal
 
 import msgspec
 
 from dikbench.errors import DikbenchError, unknown
-from dikbench.plugins.building import (
-    make_formulation,
-)
+from dikbench.plugins.building import in_declared_order, make_formulation
 from dikbench.problem.problem import program_of
 from dikbench.programs.quadratic_program import Program
 from dikbench.scenario.oracle import ORACLE
@@ -22,6 +21,10 @@ from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER
 from dikbench.study.split import SPLITS
 
 DEFAULT_STUDY = "quick"
+
+KIND_OF_AXIS: Final[Mapping[str, Literal["formulation", "scenario", "plant"]]] = MappingProxyType(
+    {"formulations": "formulation", "scenarios": "scenario", "plants": "plant"}
+)
 
 NOT_EMPTY = msgspec.Meta(min_length=1)
 Names = Annotated[tuple[str, ...], NOT_EMPTY]
@@ -113,21 +116,34 @@ def _spread(study: Study) -> Study:
     """The study with one value per parameter in each of its selectors (see `alternatives`)."""
     timing, example = study.timing, study.example
     if timing is not None:
-        timing = msgspec.structs.replace(timing, scenarios=_each(timing.scenarios))
+        timing = msgspec.structs.replace(timing, scenarios=_each("scenarios", timing.scenarios))
     return msgspec.structs.replace(
         study,
-        cells=tuple(Cells(_each(c.formulations), _each(c.solvers)) for c in study.cells),
-        scenarios=_each(study.scenarios),
-        plants=_each(study.plants),
-        example=str(parse_selector(example)) if example else "",
+        cells=tuple(
+            Cells(_each("formulations", c.formulations), _each("solvers", c.solvers))
+            for c in study.cells
+        ),
+        scenarios=_each("scenarios", study.scenarios),
+        plants=_each("plants", study.plants),
+        example=str(in_declared_order("scenario", example)) if example else "",
         timing=timing,
     )
 
 
-def _each(selectors: Iterable[str]) -> tuple[str, ...]:
-    """Every selector that a list of them stands for, in its canonical text, each once."""
-    found = dict.fromkeys(one for given in selectors for one in alternatives(given))
-    return tuple(map(str, found))
+def _each(axis: str, selectors: Iterable[str]) -> tuple[str, ...]:
+    """List every selector that those of an axis stand for, each once, in its canonical text."""
+    found: dict[str, None] = {}
+    for given in selectors:
+        for one in alternatives(given):
+            found[str(_canonical(axis, one))] = None
+    return tuple(found)
+
+
+def _canonical(axis: str, selector: Selector) -> Selector:
+    """Put the parameters of a selector in one order, whoever wrote it."""
+    if axis == "solvers":
+        return selector.ordered(("interface", "preset", *sorted(selector.parameters)))
+    return in_declared_order(KIND_OF_AXIS[axis], selector)
 
 
 def _explained(reason: str) -> str:
@@ -167,10 +183,7 @@ def select(base: Study, selection: Selection, *, named: bool) -> Study:
         return base
     selection = msgspec.structs.replace(
         selection,
-        **{
-            axis: _each(getattr(selection, axis))
-            for axis in ("formulations", "scenarios", "solvers", "plants")
-        },
+        **{axis: _each(axis, getattr(selection, axis)) for axis in (*KIND_OF_AXIS, "solvers")},
     )
     cells = base.cells
     if selection.formulations:
