@@ -83,7 +83,6 @@ class Hexagon(Family):
     laps: Annotated[int, Range(1, 5)] = 2
 
     variation = Variation(start=0.05)
-    swept = ("speed",)
     about_position_limits = True
 
     def case(self, robot: Robot, change: Perturbation) -> Case:

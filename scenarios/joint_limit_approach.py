@@ -65,7 +65,6 @@ class JointLimitApproach(Family):
     depth: Annotated[float, Range(0.02, 0.5, "rad"), Drawn(0.05, 0.4)] = 0.2
 
     variation = Variation(start=0.1, timing=0.05)
-    swept = ("deceleration", "speed", "depth")
     about_position_limits = True
 
     def case(self, robot: Robot, change: Perturbation) -> Case:

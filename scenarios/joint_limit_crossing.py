@@ -88,7 +88,6 @@ class JointLimitCrossing(Family):
     speed: Annotated[float, Range(0.05, 1.0), Drawn(0.2, 0.9)] = 0.5
 
     variation = Variation(start=0.1)
-    swept = ("depth", "speed", "approach")
     about_position_limits = True
 
     def case(self, robot: Robot, change: Perturbation) -> Case:

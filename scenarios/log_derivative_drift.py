@@ -59,7 +59,6 @@ class LogDerivativeDrift(Family):
     hold: Time = 2.0
 
     variation = Variation(start=0.05, direction=0.5, timing=0.1)
-    swept = ("distance", "orientation_cost")
 
     def check(self) -> None:
         """Check that the yaw is large, either way."""

@@ -99,7 +99,6 @@ class NearMiss(Family):
 
     robots = tuple(SINGULAR_POSTURES)
     variation = Variation(start=0.1, timing=0.1)
-    swept = ("miss", "speed")
     grid = ("miss", "speed")
 
     def case(self, robot: Robot, change: Perturbation) -> Case:

@@ -115,7 +115,6 @@ class ObstacleInTheWay(Family):
     speed: Annotated[float, Range(0.05, 0.9), Drawn(0.1, 0.6)] = 0.3
 
     variation = Variation(start=0.03, timing=0.1)
-    swept = ("depth", "speed")
 
     def check(self) -> None:
         """Check that the robot swings past an obstacle there."""

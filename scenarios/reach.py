@@ -51,7 +51,6 @@ class Reach(Family):
 
     robots = ("panda", "ur3", "ur5", "ur10", "xarm7", "talos", "planar3r", "planar4r")
     variation = Variation(start=0.1, direction=pi)
-    swept = ("distance", "angle")
 
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """See `Family`."""

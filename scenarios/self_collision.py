@@ -67,7 +67,6 @@ class SelfCollision(Family):
     speed: Annotated[float, Range(0.05, 0.9), Drawn(0.1, 0.7)] = 0.3
 
     variation = Variation(start=0.03, timing=0.1)
-    swept = ("speed",)
 
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """See `Family`."""

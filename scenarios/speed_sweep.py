@@ -61,7 +61,6 @@ class SpeedSweep(Family):
 
     robots = ("panda", "ur5", "ur10", "xarm7", "kinova", "tiago", "talos")
     variation = Variation(start=0.1, direction=0.2)
-    swept = ("speed", "radius", "turn")
 
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """See `Family`."""

@@ -74,7 +74,6 @@ class StartOutside(Family):
     duration: Time = 2.0
 
     variation = Variation(start=0.05, timing=0.1)
-    swept = ("outside", "rate")
     about_position_limits = True
 
     def case(self, robot: Robot, change: Perturbation) -> Case:

@@ -72,7 +72,6 @@ class Step(Family):
     duration: Time = 4.0
 
     variation = Variation(start=0.1, direction=0.2)
-    swept = ("distance", "angle")
 
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """See `Family`."""

@@ -109,7 +109,6 @@ class TaskConflict(Family):
     second_gain: Gain = 2.0
 
     variation = Variation(start=0.05, timing=0.1)
-    swept = ("speed",)
 
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """See `Family`."""

@@ -59,7 +59,6 @@ class TorqueLimited(Family):
 
     robots = ("panda", "ur3", "ur5", "ur10", "xarm7", "tiago")
     variation = Variation(start=0.05, direction=0.2)
-    swept = ("demand", "load", "height")
 
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """See `Family`."""

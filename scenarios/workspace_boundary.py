@@ -64,7 +64,6 @@ class WorkspaceBoundary(Family):
 
     robots = ("panda", "ur3", "ur5", "ur10", "xarm7", "kinova", "tiago", "planar3r", "planar4r")
     variation = Variation(start=0.1)
-    swept = ("extent", "speed")
 
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """See `Family`."""

@@ -75,7 +75,6 @@ class Family(Parameters, ABC):
         acceleration: whether acceleration limits are in force.
         robots: on which the defaults are certified, where the family takes any.
         variation: what a seed perturbs, and within which ranges.
-        swept: parameters against which figures may be drawn; their units are those of the ranges.
         grid: the two parameters, across and up, that span a phase diagram.
         about_position_limits: whether figures show the distance to the position limits.
     """
@@ -88,7 +87,6 @@ class Family(Parameters, ABC):
 
     robots: ClassVar[tuple[str, ...]] = ()
     variation: ClassVar[Variation] = NO_VARIATION
-    swept: ClassVar[tuple[str, ...]] = ()
     grid: ClassVar[tuple[str, str] | None] = None
     about_position_limits: ClassVar[bool] = False
 
