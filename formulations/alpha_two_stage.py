@@ -14,7 +14,7 @@ from dikbench.problem import (
     LimitKind,
     LinearizedJointTask,
     Parameters,
-    Program,
+    ProgramKind,
     QuadraticProgram,
     Range,
     Solve,
@@ -49,7 +49,7 @@ class AlphaTwoStage(Parameters):
     rank_tolerance: Annotated[float, Range(0.0)] = 1e-6
     braking: Braking = "viable"
 
-    program: ClassVar[Program] = "lp"
+    program: ClassVar[ProgramKind] = "lp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset(
         {"position", "velocity", "acceleration", "inequalities"}
     )

@@ -13,7 +13,7 @@ from dikbench.problem import (
     Drawn,
     LimitKind,
     Parameters,
-    Program,
+    ProgramKind,
     QuadraticProgram,
     Range,
     Solve,
@@ -44,7 +44,7 @@ class DisplacementQp(Parameters):
     lm_damping: Annotated[float, Range(0.0), Drawn(1e-3, 10.0, log=True)] = 0.0
     position_gain: Annotated[float, Range(above=0.0, high=1.0), Drawn(0.1, 1.0)] = 0.5
 
-    program: ClassVar[Program] = "qp"
+    program: ClassVar[ProgramKind] = "qp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:

@@ -14,7 +14,7 @@ from dikbench.problem import (
     LimitKind,
     LinearizedJointTask,
     Parameters,
-    Program,
+    ProgramKind,
     QuadraticProgram,
     Range,
     Solve,
@@ -49,7 +49,7 @@ class Drake(Parameters):
 
     centering: Annotated[float, Range(0.0, unit="1/s"), Drawn(0.0, 10.0)] = 0.0
 
-    program: ClassVar[Program] = "lp"
+    program: ClassVar[ProgramKind] = "lp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:

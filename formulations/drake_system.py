@@ -15,7 +15,7 @@ from dikbench.problem import (
     LimitKind,
     Limits,
     Parameters,
-    Program,
+    ProgramKind,
     QuadraticProgram,
     Range,
     Solve,
@@ -56,7 +56,7 @@ class DrakeSystem(Parameters):
     tracking_weight: Annotated[float, Range(above=0.0), Drawn(1.0, 1e4, log=True)] = 100.0
     centering: Annotated[float, Range(0.0, unit="1/s"), Drawn(0.0, 10.0)] = 1.0
 
-    program: ClassVar[Program] = "qp"
+    program: ClassVar[ProgramKind] = "qp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"velocity"})
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:

@@ -16,7 +16,7 @@ from dikbench.problem import (
     Drawn,
     LimitKind,
     Parameters,
-    Program,
+    ProgramKind,
     QuadraticProgram,
     Range,
     Solve,
@@ -63,7 +63,7 @@ class HierarchicalQp(Parameters):
     rank_tolerance: Annotated[float, Range(0.0)] = 1e-6
     braking: Braking = "viable"
 
-    program: ClassVar[Program] = "qp"
+    program: ClassVar[ProgramKind] = "qp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset(
         {"position", "velocity", "acceleration", "inequalities"}
     )

@@ -16,7 +16,7 @@ from dikbench.problem import (
     LimitKind,
     LinearizedTask,
     Parameters,
-    Program,
+    ProgramKind,
     QuadraticProgram,
     Range,
     Solve,
@@ -47,7 +47,7 @@ class LpAlpha(Parameters):
     regularization: Annotated[float | None, Range(0.0), Drawn(1e-6, 1e-2, log=True)] = None
     braking: Braking = "viable"
 
-    program: ClassVar[Program] = "lp"
+    program: ClassVar[ProgramKind] = "lp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset(
         {"position", "velocity", "acceleration", "inequalities"}
     )

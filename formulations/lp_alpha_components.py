@@ -18,7 +18,7 @@ from dikbench.problem import (
     LinearizedOrientation,
     LinearizedTask,
     Parameters,
-    Program,
+    ProgramKind,
     QuadraticProgram,
     Range,
     Solve,
@@ -56,7 +56,7 @@ class LpAlphaComponents(Parameters):
     regularization: Annotated[float | None, Range(0.0), Drawn(1e-6, 1e-2, log=True)] = None
     braking: Braking = "viable"
 
-    program: ClassVar[Program] = "lp"
+    program: ClassVar[ProgramKind] = "lp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:

@@ -16,7 +16,7 @@ from dikbench.problem import (
     LimitKind,
     ModelledProgram,
     Parameters,
-    Program,
+    ProgramKind,
     Range,
     Solve,
 )
@@ -43,7 +43,7 @@ class LpAlphaCvxpy(Parameters):
     regularization: Annotated[float | None, Range(0.0), Drawn(1e-6, 1e-2, log=True)] = None
     braking: Braking = "viable"
 
-    program: ClassVar[Program] = "cvxpy"
+    program: ClassVar[ProgramKind] = "cvxpy"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:

@@ -15,7 +15,7 @@ from dikbench.problem import (
     LimitKind,
     Limits,
     Parameters,
-    Program,
+    ProgramKind,
     QuadraticProgram,
     Range,
     Solve,
@@ -60,7 +60,7 @@ class Neo(Parameters):
     stop_distance: Annotated[float, Range(0.0, unit="rad"), Drawn(0.01, 0.2)] = 0.05
     influence_distance: Annotated[float, Range(above=0.0, unit="rad"), Drawn(0.3, 1.2)] = 0.9
 
-    program: ClassVar[Program] = "qp"
+    program: ClassVar[ProgramKind] = "qp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"velocity"})
 
     def check(self) -> None:

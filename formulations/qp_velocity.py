@@ -11,7 +11,7 @@ from dikbench.problem import (
     Drawn,
     LimitKind,
     Parameters,
-    Program,
+    ProgramKind,
     QuadraticProgram,
     Range,
     Solve,
@@ -37,7 +37,7 @@ class QpVelocity(Parameters):
 
     damping: Annotated[float, Range(0.0), Drawn(1e-4, 0.1, log=True)] = 1e-3
 
-    program: ClassVar[Program] = "qp"
+    program: ClassVar[ProgramKind] = "qp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"velocity"})
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:

@@ -12,7 +12,7 @@ from dikbench.problem import (
     Drawn,
     LimitKind,
     Parameters,
-    Program,
+    ProgramKind,
     QuadraticProgram,
     Range,
     Solve,
@@ -48,7 +48,7 @@ class WeightedQp(Parameters):
     position_gain: Annotated[float, Range(above=0.0, high=1.0), Drawn(0.1, 1.0)] = 0.5
     log_derivative: bool = False
 
-    program: ClassVar[Program] = "qp"
+    program: ClassVar[ProgramKind] = "qp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset(
         {"position", "velocity", "acceleration", "inequalities"}
     )

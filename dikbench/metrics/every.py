@@ -7,8 +7,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from dikbench.metrics.constraints import CONSTRAINTS
 from dikbench.metrics.contour import CONTOUR
+from dikbench.metrics.distance_and_torque import CONSTRAINTS
 from dikbench.metrics.metric import Metric
 from dikbench.metrics.motion import Motion
 from dikbench.metrics.null_space_drift import NULL_SPACE_DRIFT

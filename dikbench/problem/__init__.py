@@ -52,7 +52,7 @@ from dikbench.problem.tasks.orientation import LinearizedOrientation
 from dikbench.problem.tasks.task import LinearizedJointTask, LinearizedTask
 from dikbench.problem.velocity_box import Box, Braking
 from dikbench.programs.modelled_program import ModelledProgram
-from dikbench.programs.quadratic_program import Program, QuadraticProgram
+from dikbench.programs.quadratic_program import ProgramKind, QuadraticProgram
 from dikbench.robots.braking import sqrt_brake, viable_brake
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.limits import Interval, Limits
@@ -84,7 +84,7 @@ __all__ = [
     "PoseTask",
     "PositionTask",
     "PostureTask",
-    "Program",
+    "ProgramKind",
     "Projector",
     "QuadraticProgram",
     "Range",

@@ -12,7 +12,7 @@ from dikbench.arrays import Array
 from dikbench.problem.tasks.task import LinearizedTask, stacked
 from dikbench.problem.velocity_box import Box, Braking, velocity_box
 from dikbench.programs.modelled_program import ModelledProgram
-from dikbench.programs.quadratic_program import Program, QuadraticProgram
+from dikbench.programs.quadratic_program import ProgramKind, QuadraticProgram
 from dikbench.robots.limits import Limits
 from dikbench.robots.robot import Robot
 
@@ -107,9 +107,9 @@ class Formulation(Protocol):
         ...
 
 
-def program_of(formulation: Formulation) -> Program | None:
+def program_of(formulation: Formulation) -> ProgramKind | None:
     """What the formulation needs a solver for; None where it needs none."""
-    program: Program | None = getattr(formulation, "program", None)
+    program: ProgramKind | None = getattr(formulation, "program", None)
     return program
 
 

@@ -8,7 +8,7 @@ import msgspec
 
 from dikbench.arrays import Array
 
-Program = Literal["qp", "lp", "cvxpy"]
+ProgramKind = Literal["qp", "lp", "cvxpy"]
 """What a law hands to its solver: a strictly convex quadratic program, one that may be linear, or
 one written in cvxpy's modelling words."""
 

@@ -20,7 +20,7 @@ from dikbench.results.store import Store
 from dikbench.run.pool import end_group, workers
 from dikbench.run.progress_display import ProgressDisplay
 from dikbench.run.provenance import environment, git_commit, manifest
-from dikbench.run.timing import Cell, time_scenario
+from dikbench.run.timing import Contender, time_scenario
 from dikbench.run.trial_row import CannotStore, TracePolicy, TrialRow, row_without_run, work
 from dikbench.scenario.oracle import ORACLE
 from dikbench.selector import Selector, parse_selector
@@ -239,7 +239,7 @@ def _time(
     done, timing = store.statuses(), study.timing
     # A law that took its process with it in a trial would do so again, and the others' times too.
     fatal = {(p.trial.formulation, p.trial.solver) for p in planned if done.get(p.id) in FATAL}
-    cells: list[Cell] = list(
+    cells: list[Contender] = list(
         dict.fromkeys(
             cell
             for p in planned

@@ -32,7 +32,7 @@ LEAD_IN: Final = 5
 """Problems that are replayed before each timed segment: they bring back what another cell drove out
 of the caches, and a warm start to where the segment begins."""
 
-Cell = tuple[Selector, Selector]
+Contender = tuple[Selector, Selector]
 """The selectors of a formulation and its solver."""
 
 PARTS: Final = ("whole", "own", "core", "wrapper")
@@ -62,7 +62,12 @@ def record_problems(scenario: Scenario, formulation: Formulation, count: int) ->
 
 
 def time_scenario(
-    selector: Selector, seed: int, cells: Sequence[Cell], reference: str, problems: int, rounds: int
+    selector: Selector,
+    seed: int,
+    cells: Sequence[Contender],
+    reference: str,
+    problems: int,
+    rounds: int,
 ) -> list[TrialRow]:
     """Time every cell on one scenario's problems.
 

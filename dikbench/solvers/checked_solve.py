@@ -12,7 +12,7 @@ from dikbench.arrays import Array
 from dikbench.errors import DikbenchError, Infeasible, SolverFailed
 from dikbench.programs.answer import Answer
 from dikbench.programs.modelled_program import ModelledProgram
-from dikbench.programs.quadratic_program import Program, QuadraticProgram
+from dikbench.programs.quadratic_program import ProgramKind, QuadraticProgram
 from dikbench.solvers.catalogue.back_ends import Solver
 from dikbench.solvers.catalogue.presets import TOLERANCES
 from dikbench.solvers.recheck.feasibility import is_feasible
@@ -124,7 +124,7 @@ def _refuse(program: object, site: int) -> Answer:
 
 
 def make_solve(
-    solver: Solver | None, program: Program | None, *, checks: bool = True
+    solver: Solver | None, program: ProgramKind | None, *, checks: bool = True
 ) -> CheckedSolve:
     """Build the `solve` for one trial.
 

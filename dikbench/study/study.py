@@ -13,7 +13,7 @@ import msgspec
 from dikbench.errors import DikbenchError, unknown
 from dikbench.plugins.building import in_declared_order, make_formulation
 from dikbench.problem.problem import program_of
-from dikbench.programs.quadratic_program import Program
+from dikbench.programs.quadratic_program import ProgramKind
 from dikbench.scenario.oracle import ORACLE
 from dikbench.scenario.plant import REFERENCE_MODES
 from dikbench.selector import Selector, alternatives, parse_selector
@@ -216,7 +216,7 @@ def _cells_for(base: Study, formulation: Selector, named: bool) -> Cells:
     return Cells((str(formulation),), (DEFAULT_SOLVER[program],))
 
 
-def _program(formulation: Selector) -> Program | None:
+def _program(formulation: Selector) -> ProgramKind | None:
     """Return what a formulation needs a solver for; the oracle needs none."""
     if formulation.name == ORACLE:
         return None

@@ -23,7 +23,7 @@ import pinocchio as pin
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.problem.problem import DikProblem, Formulation, LimitKind, program_of, promises_of
-from dikbench.programs.quadratic_program import Program
+from dikbench.programs.quadratic_program import ProgramKind
 from dikbench.simulation.control_step import TrialEnded, control_step
 from dikbench.simulation.status import Status
 from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, Solver, parse_solver, why_not
@@ -101,8 +101,8 @@ def check_declaration(formulation: Formulation, solver: str | None = None) -> No
     parameters = getattr(formulation, "__dataclass_params__", None)
     if isinstance(formulation, type) or not is_dataclass(formulation) or not parameters.frozen:
         raise AssertionError(f"{name} is not an instance of a class with @dataclass(frozen=True)")
-    if program_of(formulation) not in {None, *get_args(Program)}:
-        valid = ", ".join(get_args(Program))
+    if program_of(formulation) not in {None, *get_args(ProgramKind)}:
+        valid = ", ".join(get_args(ProgramKind))
         raise AssertionError(f"{name}.program is {program_of(formulation)!r}; valid: None, {valid}")
     wrong = promises_of(formulation) - set(get_args(LimitKind))
     if wrong:

@@ -11,7 +11,7 @@ from typing import Any, Final, Literal, get_args
 import msgspec
 
 from dikbench.errors import DikbenchError, unknown
-from dikbench.programs.quadratic_program import Program
+from dikbench.programs.quadratic_program import ProgramKind
 from dikbench.selector import Selector, parse_selector
 from dikbench.solvers.catalogue.presets import TOLERANCES, Preset, preset_settings
 
@@ -38,15 +38,15 @@ class BackEnd:
     summary: str
     package: str
     distribution: str
-    programs: frozenset[Program]
+    programs: frozenset[ProgramKind]
     interfaces: tuple[Interface, ...]
     settings: Mapping[str, type]
     no_lp: str = ""
     ours: Mapping[str, Any] = field(default_factory=dict)
 
 
-_QP_ONLY: Final[frozenset[Program]] = frozenset({"qp"})
-_QP_AND_LP: Final[frozenset[Program]] = frozenset({"qp", "lp"})
+_QP_ONLY: Final[frozenset[ProgramKind]] = frozenset({"qp"})
+_QP_AND_LP: Final[frozenset[ProgramKind]] = frozenset({"qp", "lp"})
 
 BACK_ENDS: Mapping[str, BackEnd] = MappingProxyType(
     {
@@ -125,7 +125,7 @@ BACK_ENDS: Mapping[str, BackEnd] = MappingProxyType(
     }
 )
 
-DEFAULT_SOLVER: Final[Mapping[Program, str]] = MappingProxyType(
+DEFAULT_SOLVER: Final[Mapping[ProgramKind, str]] = MappingProxyType(
     {"qp": "daqp", "lp": "daqp", "cvxpy": "clarabel"}
 )
 """The solver that a law gets where none is named."""
@@ -181,7 +181,7 @@ def parse_solver(text: str | Selector) -> Solver:
     return Solver(selector.name, interface, MappingProxyType(settings), TOLERANCES[preset])
 
 
-def why_not(solver: Solver, program: Program) -> str:
+def why_not(solver: Solver, program: ProgramKind) -> str:
     """Why this solver cannot take this kind of program; empty where it can."""
     back_end = BACK_ENDS[solver.name]
     if program == "cvxpy":

@@ -28,7 +28,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from dikbench.arrays import Array
-from dikbench.problem import DikProblem, Program, Solve
+from dikbench.problem import DikProblem, ProgramKind, Solve
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Mine:
     careful: bool = False
     side: Literal["left", "right"] = "left"
 
-    program: ClassVar[Program] = "qp"
+    program: ClassVar[ProgramKind] = "qp"
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

@@ -19,7 +19,7 @@ from dikbench.errors import Infeasible, SolverFailed
 from dikbench.problem import DikProblem, Formulation, Solve
 from dikbench.problem.tasks import PoseTask
 from dikbench.programs.answer import Answer
-from dikbench.programs.quadratic_program import Program, QuadraticProgram
+from dikbench.programs.quadratic_program import ProgramKind, QuadraticProgram
 from dikbench.robots.catalogue import load_robot
 from dikbench.scenario import Scenario
 from dikbench.scenario.certificate import Certificate
@@ -211,7 +211,7 @@ def test_a_law_that_solves_without_saying_so_is_told() -> None:
 class _Projection:
     """The velocity nearest to the exact one inside the limits, as a quadratic program."""
 
-    program: ClassVar[Program] = "qp"
+    program: ClassVar[ProgramKind] = "qp"
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
@@ -251,7 +251,7 @@ def test_a_lying_solver_is_caught_and_its_answer_applied() -> None:
 class _Impossible:
     """x = 0 and x = 1, always."""
 
-    program: ClassVar[Program] = "qp"
+    program: ClassVar[ProgramKind] = "qp"
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

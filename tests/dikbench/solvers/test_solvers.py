@@ -11,7 +11,7 @@ import pytest
 from dikbench.arrays import Array
 from dikbench.errors import Infeasible, SolverFailed
 from dikbench.programs.modelled_program import ModelledProgram
-from dikbench.programs.quadratic_program import Program, QuadraticProgram
+from dikbench.programs.quadratic_program import ProgramKind, QuadraticProgram
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
 from dikbench.solvers.catalogue.back_ends import (
@@ -42,7 +42,7 @@ ACCURACY = 5e-3
 """The loosest default tolerance (OSQP's 1e-3), with room for the conditioning of the examples."""
 
 
-def _solve(selector: str, program: Program = "qp") -> CheckedSolve:
+def _solve(selector: str, program: ProgramKind = "qp") -> CheckedSolve:
     return make_solve(parse_solver(selector), program)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.programs.quadratic_program import Program, QuadraticProgram
+from dikbench.programs.quadratic_program import ProgramKind, QuadraticProgram
 from dikbench.solvers.catalogue.back_ends import (
     BACK_ENDS,
     DEFAULT_SOLVER,
@@ -33,7 +33,7 @@ ACCURACY = 5e-3
 """The loosest default tolerance (OSQP's 1e-3), with room for the conditioning of the examples."""
 
 
-def _solve(selector: str, program: Program = "qp") -> CheckedSolve:
+def _solve(selector: str, program: ProgramKind = "qp") -> CheckedSolve:
     return make_solve(parse_solver(selector), program)
 
 

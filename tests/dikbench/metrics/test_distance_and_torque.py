@@ -12,7 +12,7 @@ import pytest
 from dikbench import SphereObstacle
 from dikbench.arrays import Array
 from dikbench.metrics import METRICS, motion_of
-from dikbench.metrics.constraints import CONSTRAINTS
+from dikbench.metrics.distance_and_torque import CONSTRAINTS
 from dikbench.problem.constraints import CollisionConstraint, Constraint, TorqueConstraint
 from dikbench.problem.tasks import PoseTask
 from dikbench.robots.catalogue import load_robot
