@@ -53,7 +53,7 @@ TIMES: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
 RENAMED: Final[Mapping[str, str]] = MappingProxyType(
     {
         **{
-            name.replace("formulation", "formulation", 1): name
+            name.replace("formulation", "law", 1): name
             for name in TIMES
             if name.startswith("formulation_")
         },
