@@ -30,7 +30,7 @@ def test_the_shipped_studies_share_no_seed_and_no_scenario() -> None:
     assert (train.split, test.split) == ("train", "test")
     assert set(train.seeds) <= set(SPLITS["train"])
     assert set(test.seeds) <= set(SPLITS["test"])
-    ids = [{scenario_id(parse_selector(text)) for text in study.scenarios} for study in (train, test)]
+    ids = [{scenario_id(parse_selector(t)) for t in s.scenarios} for s in (train, test)]
     assert not ids[0] & ids[1]
     families = [{parse_selector(t).name for t in s.scenarios} for s in (train, test)]
     assert families[0] == families[1]
