@@ -286,12 +286,10 @@ class Store:
             columns = [row[1] for row in self._database.execute("PRAGMA table_info(trials)")]
         except sqlite3.DatabaseError as error:
             raise DikbenchError(f"store {self.path}: not a store of dikbench: {error}") from None
-        if found.get("schema") == "1":
-            self._rename_times()
-        elif found.get("schema") != str(SCHEMA):
+        if found.get("schema") not in ("1", str(SCHEMA)):
             raise OtherVersion(
                 f"store {self.path}: schema version {found.get('schema')!r} is not known; this "
-                f"dikbench reads version {SCHEMA}"
+                f"dikbench reads versions 1 and {SCHEMA}"
             )
         missing = [name for name in NUMBERS if name not in columns]
         if missing and not add_metrics:
@@ -299,6 +297,8 @@ class Store:
                 f"store {self.path}: written by a dikbench with other metrics (it lacks "
                 f"{min(missing)!r}); choose another folder, or add them with `dikbench recompute`"
             )
+        if found["schema"] == "1":
+            self._rename_times()
         for name in missing:
             self._database.execute(f"ALTER TABLE trials ADD COLUMN {name} REAL")
 

@@ -106,7 +106,7 @@ def test_a_page_needs_nothing_else(pages: dict[str, str], runs: Path, family: st
     page = pages[family]
     assert not re.search(r"""<(script|link|img)[^>]+(src|href)\s*=""", page)
     recording = recording_of(runs, family)
-    assert recording.trial.scenario in page
+    assert str(recording.trial.scenario) in page
     assert f"<title>{recording.id}</title>" in page
     assert "past a limit" in page
 

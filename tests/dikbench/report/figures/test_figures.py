@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pandas as pd
 import pytest
+from makers.rows import random_rows
 
 from dikbench.metrics import METRICS
 from dikbench.report.drawing.figure import Figure
@@ -17,8 +18,6 @@ from dikbench.report.drawing.style import file_name, short
 from dikbench.report.figures.every import draw_figures
 from dikbench.results.columns import TIMES
 from dikbench.results.folder import ResultsFolder
-
-MakeTrials = Callable[..., pd.DataFrame]
 
 LAWS = ["dls[damping=0.1]", "dls[damping=0.2]", "dls[damping=0.3]", ("qp", "daqp")]
 SCENARIOS = [f"near-miss[miss={miss},speed={v}]" for miss in (0, 0.1, 0.2) for v in (1, 2)]
@@ -51,14 +50,14 @@ def files(figures: Iterable[Figure]) -> set[str]:
     return {figure.file for figure in figures if "profiles" not in figure.file}
 
 
-def test_every_kind_is_drawn(make_trials: MakeTrials, tmp_path: Path) -> None:
+def test_every_kind_is_drawn(tmp_path: Path) -> None:
     """A table that has data for every figure but those against time gives them all."""
-    assert files(drawn_in(tmp_path, make_trials(LAWS, SCENARIOS))) == KINDS
+    assert files(drawn_in(tmp_path, random_rows(LAWS, SCENARIOS))) == KINDS
 
 
-def test_the_same_table_gives_the_same_bytes(make_trials: MakeTrials, tmp_path: Path) -> None:
+def test_the_same_table_gives_the_same_bytes(tmp_path: Path) -> None:
     """Drawn twice, every file is the same to the last byte."""
-    trials, folders = make_trials(LAWS, SCENARIOS), [tmp_path / "1", tmp_path / "2"]
+    trials, folders = random_rows(LAWS, SCENARIOS), [tmp_path / "1", tmp_path / "2"]
     for folder in folders:
         folder.mkdir()
         drawn_in(folder, trials)
@@ -66,9 +65,9 @@ def test_the_same_table_gives_the_same_bytes(make_trials: MakeTrials, tmp_path: 
     assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
 
 
-def test_an_svg_may_stand_in_a_page(make_trials: MakeTrials, tmp_path: Path) -> None:
+def test_an_svg_may_stand_in_a_page(tmp_path: Path) -> None:
     """No SVG has a style sheet, or names for groups that another one has too; each has a font."""
-    for figure in drawn_in(tmp_path, make_trials(LAWS, SCENARIOS)):
+    for figure in drawn_in(tmp_path, random_rows(LAWS, SCENARIOS)):
         root = ElementTree.fromstring((tmp_path / "figures" / figure.file).read_bytes())
         tags = [element.tag.rpartition("}")[2] for element in root.iter()]
         assert "style" not in tags
@@ -143,13 +142,12 @@ OUTCOME = {"phase_diagram_1_outcome.svg"}
     ],
 )
 def test_a_figure_without_data_is_left_out(
-    make_trials: MakeTrials,
     tmp_path: Path,
     degenerate: Callable[[pd.DataFrame], pd.DataFrame],
     expected: set[str] | None,
 ) -> None:
     """Of a degenerate table what can be drawn is drawn, without an error or a warning."""
-    found = files(drawn_in(tmp_path, degenerate(make_trials(LAWS, SCENARIOS))))
+    found = files(drawn_in(tmp_path, degenerate(random_rows(LAWS, SCENARIOS))))
     assert found == expected if expected is not None else found <= KINDS
 
 
@@ -164,11 +162,11 @@ HOSTILE = [
 ]
 
 
-def test_hostile_names_stay_text(make_trials: MakeTrials, tmp_path: Path) -> None:
+def test_hostile_names_stay_text(tmp_path: Path) -> None:
     """Names that are markup, paths or formulas are written as they are, and in no file name."""
     formulations = [f"{HOSTILE[0]}[../p<={value}]" for value in (1, 2, 3)] + HOSTILE[1:]
     scenarios = [f"{HOSTILE[1]}[<b>/../={value}]" for value in (1, 2, 3)]
-    figures = drawn_in(tmp_path, make_trials(formulations, scenarios))
+    figures = drawn_in(tmp_path, random_rows(formulations, scenarios))
     assert any("law_" in figure.file for figure in figures)
     written = ""
     for figure in figures:
