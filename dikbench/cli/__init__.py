@@ -11,6 +11,7 @@ from typing import Any
 
 import click
 
+from dikbench.cli.checking import check
 from dikbench.cli.one_line_errors import one_line_errors
 from dikbench.cli.reading_commands import compare, replay
 
@@ -295,5 +296,6 @@ def show(name: str, figure: Path | None) -> None:
     click.echo(text)
 
 
+commands.add_command(check)
 commands.add_command(compare)
 commands.add_command(replay)
