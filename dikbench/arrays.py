@@ -20,5 +20,5 @@ def plain(array: Array) -> Array:
 
 def read_only(array: Array) -> Array:
     """Forbid writing to an array, and return it."""
-    array.flags.writeable = False
+    array.setflags(write=False)  # half the time of array.flags.writeable = False
     return array

@@ -33,6 +33,8 @@ def pose_problem(
         DikbenchError: if a task or a constraint does not fit the robot.
     """
     robot, q = kinematics.robot, kinematics.q
-    linearized = [tracking, *[task.linearize(kinematics) for task in tasks]]
+    linearized = [tracking]
+    for task in tasks:
+        linearized.append(task.linearize(kinematics))
     G, h = linearize_all(constraints, kinematics, v_prev, dt)
-    return DikProblem(robot, q, v_prev, dt, linearized, robot.limits.at(q), G=G, h=h)
+    return DikProblem(robot, q, v_prev, dt, linearized, robot.limits.at(q), 0, G, h)

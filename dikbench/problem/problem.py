@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import groupby, pairwise
 from operator import attrgetter
 from typing import Final, Literal, Protocol, runtime_checkable
 
@@ -37,8 +38,6 @@ class DikProblem(msgspec.Struct, eq=False):
         relaxed: joints whose acceleration bound `box` had to give up (a record, see `box`).
         G, h: what else must hold, G v <= h, (p, nv) and (p,); None where nothing else must (see
             `dikbench.problem.constraints`).
-        levels: one task per priority, most important first, equal priorities stacked. Computed from
-            the tasks when the problem is made, never given.
     """
 
     robot: Robot
@@ -50,18 +49,23 @@ class DikProblem(msgspec.Struct, eq=False):
     relaxed: int = 0
     G: Array | None = None
     h: Array | None = None
-    levels: Sequence[LinearizedTask] = ()
+    _levels: tuple[LinearizedTask, ...] | None = None
 
     def __post_init__(self) -> None:
-        """Sort the tasks and stack those of one priority."""
-        self.tasks = tuple(sorted(self.tasks, key=_PRIORITY))
-        levels: list[list[LinearizedTask]] = []
-        for task in self.tasks:
-            if levels and levels[-1][0].priority == task.priority:
-                levels[-1].append(task)
-            else:
-                levels.append([task])
-        self.levels = tuple([stacked(level) for level in levels])
+        """Sort the tasks. Most are sorted already, one per priority: then they are the levels."""
+        self.tasks = self._levels = tasks = tuple(self.tasks)
+        for first, second in pairwise(tasks):
+            if first.priority >= second.priority:
+                self.tasks, self._levels = tuple(sorted(tasks, key=_PRIORITY)), None
+                break
+
+    @property
+    def levels(self) -> tuple[LinearizedTask, ...]:
+        """One task per priority, most important first, equal priorities stacked: computed once."""
+        if self._levels is None:
+            groups = groupby(self.tasks, _PRIORITY)
+            self._levels = tuple([stacked([*group]) for _, group in groups])
+        return self._levels
 
     @property
     def primary(self) -> LinearizedTask:

@@ -56,18 +56,19 @@ class Plant(Parameters, ABC):
 class StartedPlant:
     """A plant in one trial: its random numbers and the commands that are under way."""
 
-    __slots__ = ("_arriving", "_dt", "_model", "_plant", "_random")
+    __slots__ = ("_arriving", "_drive", "_dt", "_model", "_noise", "_random")
 
     def __init__(self, plant: Plant, scenario: Scenario, seed: int) -> None:
-        self._plant, self._model, self._dt = plant, scenario.robot.model, scenario.dt
+        self._drive, self._noise = plant.drive, plant.noise
+        self._model, self._dt = scenario.robot.model, scenario.dt
         self._random = np.random.default_rng([seed, NOISE_STREAM])
         self._arriving = deque([read_only(scenario.v0.copy())] * plant.delay)
 
     def seen(self, q: Array) -> Array:
         """Measure the true configuration, (nq,); without noise the result is `q` itself."""
-        if not self._plant.noise:
+        if not self._noise:
             return q
-        error = self._random.normal(0.0, self._plant.noise, self._model.nv)
+        error = self._random.normal(0.0, self._noise, self._model.nv)
         return read_only(pin.integrate(self._model, q, error))
 
     def apply(self, v: Array, limits: Limits) -> Array:
@@ -81,7 +82,9 @@ class StartedPlant:
             The velocity (nv,) with which the robot moves during this step, read-only.
         """
         self._arriving.append(v)
-        return read_only(self._plant.drive(self._arriving.popleft(), limits, self._dt))
+        arrived = self._arriving.popleft()
+        applied = self._drive(arrived, limits, self._dt)
+        return applied if applied is arrived else read_only(applied)
 
 
 @dataclass(frozen=True)

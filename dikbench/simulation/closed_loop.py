@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from time import perf_counter_ns
 from typing import Final
 
-import msgspec
 import numpy as np
 import pinocchio as pin
 
@@ -56,17 +56,9 @@ class Run:
     jacobians: Array
 
 
-class _Step(msgspec.Struct, eq=False):
-    """The record of a control step that was applied; its arrays are read-only (see `Trace`)."""
-
-    q: Array
-    tau: float
-    wanted: Array
-    jacobian: Array
-    commanded: Array
-    applied: Array
-    status: Status
-    relaxed: int
+_Step = tuple[Array, float, Array, Array, Array, Array, Status, int]
+"""The record of a control step that was applied, its arrays read-only: q, tau, wanted, jacobian,
+commanded, applied, status, relaxed (see `Trace`)."""
 
 
 def simulate(
@@ -90,28 +82,25 @@ def simulate(
     Returns:
         The trace and how the run ended; failures of the formulation are statuses, never exceptions.
     """
-    robot, dt, tracking = scenario.robot, scenario.dt, scenario.tracking
-    kinematics, clock, started = (
-        Kinematics(robot),
-        CLOCKS[mode](scenario),
-        plant.start(scenario, seed),
-    )
+    robot, model, dt = scenario.robot, scenario.robot.model, scenario.dt
+    tracking, tasks, constraints = scenario.tracking, scenario.tasks, scenario.constraints
+    kinematics, clock = Kinematics(robot), CLOCKS[mode](scenario)
+    started = plant.start(scenario, seed)
     q, v_prev = read_only(scenario.q0.copy()), read_only(scenario.v0.copy())
     steps: list[_Step] = []
     kinematics_ns = formulation_ns = 0
     status, message = Status.OK, ""
     solve.begin_run(clock.most_steps)
     try:
-        while not clock.is_over:
-            k, (target, twist), seen = len(steps), clock.target(), started.seen(q)
+        for target, twist in clock:
+            k, seen = len(steps), started.seen(q)
             start = perf_counter_ns()
             kinematics.update(seen)
             task = tracking.linearize(kinematics, target, twist)
-            problem = pose_problem(
-                kinematics, v_prev, dt, task, scenario.tasks, scenario.constraints
-            )
+            problem = pose_problem(kinematics, v_prev, dt, task, tasks, constraints)
             for each in problem.tasks:
-                each.J.flags.writeable = each.V.flags.writeable = False
+                each.J.setflags(write=False)
+                each.V.setflags(write=False)
             kinematics_ns += perf_counter_ns() - start
             # What the formulation does to the problem reaches neither the record nor the plant.
             wanted, jacobian = task.V, task.J
@@ -125,44 +114,43 @@ def simulate(
             v = read_only(answer.velocity)
             applied = started.apply(v, limits)
             steps.append(
-                _Step(q, clock.tau, wanted, jacobian, v, applied, answer.status, problem.relaxed)
+                (q, clock.tau, wanted, jacobian, v, applied, answer.status, problem.relaxed)
             )
             clock.advance(wanted, jacobian, applied)
-            q, v_prev = read_only(pin.integrate(robot.model, q, applied * dt)), applied
+            q, v_prev = read_only(pin.integrate(model, q, applied * dt)), applied
     except TrialEnded as ended:
         status, message = ended.status, f"step {len(steps)}: {ended}"
-    jacobians = _joined([step.jacobian for step in steps], len(scenario.rows), robot.nv)
-    trace = _trace(scenario, steps, q, clock.tau, jacobians, solve.rechecked())
+    trace, jacobians = _recorded(scenario, steps, q, clock.tau, solve.rechecked())
     return Run(trace, status, message, kinematics_ns, formulation_ns, jacobians)
 
 
-def _trace(
-    scenario: Scenario,
-    steps: list[_Step],
-    q: Array,
-    tau: float,
-    jacobians: Array,
-    rechecked: RecheckedSteps,
-) -> Trace:
-    """Make the trace of steps that ended in q at tau; those that went nowhere become `stuck`."""
+def _recorded(
+    scenario: Scenario, steps: list[_Step], q: Array, tau: float, rechecked: RecheckedSteps
+) -> tuple[Trace, Array]:
+    """Make the trace and the Jacobians (n, m, nv) of steps that ended in q at tau.
+
+    Steps that made less than `STUCK_PROGRESS` of the desired motion become `stuck`.
+    """
     n, nv, m = len(steps), scenario.robot.nv, len(scenario.rows)
-    wanted = _joined([step.wanted for step in steps], m)
-    commanded = _joined([step.commanded for step in steps], nv)
+    columns = [*zip(*steps, strict=True)] or [()] * 8
+    before, taus, wanted_list, jacobian_list, commanded_list, applied, statuses, relaxed = columns
+    wanted, commanded = _joined(wanted_list, m), _joined(commanded_list, nv)
+    jacobians = _joined(jacobian_list, m, nv)
     achieved = np.einsum("kij,kj->ki", jacobians, commanded)
     alpha = progress(wanted, achieved, row_weights(scenario.rows))
-    status = np.array([STEP_STATUSES.index(step.status) for step in steps], dtype=int)
+    status = np.array([STEP_STATUSES.index(each) for each in statuses], dtype=int)
     ok = STEP_CODE[Status.OK]
     status[(status == ok) & rechecked.lied[:n]] = STEP_CODE[Status.NOT_VERIFIED]
     status[(status == ok) & (alpha < STUCK_PROGRESS)] = STEP_CODE[Status.STUCK]
-    return Trace(
+    trace = Trace(
         scenario.dt,
-        _joined([*(step.q for step in steps), q], scenario.robot.nq),
-        np.array([*(step.tau for step in steps), tau]),
+        _joined((*before, q), scenario.robot.nq),
+        np.array([*taus, tau]),
         wanted,
         commanded,
-        _joined([step.applied for step in steps], nv),
+        _joined(applied, nv),
         status,
-        np.array([step.relaxed for step in steps], dtype=int),
+        np.array(relaxed, dtype=int),
         rechecked.claimed[:n],
         rechecked.verified[:n],
         rechecked.primal[:n],
@@ -170,8 +158,9 @@ def _trace(
         rechecked.gap[:n],
         rechecked.distance[:n],
     )
+    return trace, jacobians
 
 
-def _joined(parts: list[Array], *shape: int) -> Array:
+def _joined(parts: Sequence[Array], *shape: int) -> Array:
     """Join arrays of one shape into one, (len(parts), *shape)."""
     return np.concatenate(parts or [np.empty((0, *shape))]).reshape(len(parts), *shape)
