@@ -162,13 +162,13 @@ def test_a_program_in_modelling_words_gives_its_unknowns_stacked(name: str) -> N
 def test_the_program_is_not_changed_by_solving_it(call: str) -> None:
     """Solvers get the law's own arrays: they must be left as they were."""
     program, _ = _mixture()
-    before = {part: getattr(program, part).copy() for part in program.__slots__}
+    before = {part: getattr(program, part).copy() for part in program.__struct_fields__}
     _solve(call)(program)
     for part, value in before.items():
         assert np.array_equal(getattr(program, part), value), part
 
 
-@pytest.mark.parametrize("part", QuadraticProgram.__slots__)
+@pytest.mark.parametrize("part", QuadraticProgram.__struct_fields__)
 @pytest.mark.parametrize("call", CALLS)
 def test_a_program_may_be_read_only(call: str, part: str) -> None:
     """Some arrays are shared between steps, and nobody can write to them."""

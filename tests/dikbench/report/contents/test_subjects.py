@@ -93,7 +93,7 @@ def test_variants_of_a_law_stand_together_with_every_attribute() -> None:
 def test_every_shipped_docstring_is_taken_apart(kind: str) -> None:
     """Nothing of a docstring is lost: each of its words stands in one of the parts."""
     for plugin in plugins(kind).values():
-        text = plugin.documented.__doc__ or ""
+        text = plugin.factory.__doc__ or ""
         parsed = parse_docstring(text)
         assert parsed.summary == plugin.summary
         assert "Source" in parsed.titled

@@ -118,7 +118,7 @@ def test_a_multiplier_of_an_infinite_bound_is_a_dual_residual(sign: int) -> None
     assert found.dual == pytest.approx(2.0)
     assert found.gap == 0.0
     right = _of(program, Answer(np.array([2.0 * sign]), True, z_box=np.zeros(1)))
-    assert (right.primal, right.dual, right.gap) == (0.0, 0.0, 0.0)
+    assert [right.primal, right.dual, right.gap] == [0.0, 0.0, 0.0]
 
 
 def test_an_infinite_side_of_an_inequality_does_not_count() -> None:
@@ -127,7 +127,7 @@ def test_an_infinite_side_of_an_inequality_does_not_count() -> None:
         np.eye(1), np.array([-2.0]), np.ones((2, 1)), np.array([np.inf, 1.0])
     )
     found = _of(program, Answer(np.ones(1), True, z=np.array([0.0, 1.0])))
-    assert (found.primal, found.dual, found.gap) == (0.0, 0.0, 0.0)
+    assert [found.primal, found.dual, found.gap] == [0.0, 0.0, 0.0]
 
 
 def test_dual_residuals_are_relative_to_the_cost() -> None:
