@@ -155,7 +155,10 @@ def test_a_study_that_is_not_there_names_the_shipped_ones() -> None:
         load_study("quik")
 
 
-def test_a_timing_reference_that_needs_a_solver_is_an_error(write_study: WriteStudy) -> None:
+@pytest.mark.parametrize("reference", ["qp", "oracle"])
+def test_a_timing_reference_that_needs_a_solver_is_an_error(
+    write_study: WriteStudy, reference: str
+) -> None:
     """The formulation whose problems are replayed must be one that needs no solver."""
     path = write_study(MINIMAL + '[timing]\nreference = "qp"\n')
     with pytest.raises(

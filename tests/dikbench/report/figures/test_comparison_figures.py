@@ -7,6 +7,7 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from makers.rows import random_rows

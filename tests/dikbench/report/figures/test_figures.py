@@ -19,7 +19,12 @@ from dikbench.report.figures.every import draw_figures
 from dikbench.results.columns import TIMES
 from dikbench.results.folder import ResultsFolder
 
-LAWS = ["dls[damping=0.1]", "dls[damping=0.2]", "dls[damping=0.3]", ("qp", "daqp")]
+LAWS: list[str | tuple[str, str]] = [
+    "dls[damping=0.1]",
+    "dls[damping=0.2]",
+    "dls[damping=0.3]",
+    ("qp", "daqp"),
+]
 SCENARIOS = [f"near-miss[miss={miss},speed={v}]" for miss in (0, 0.1, 0.2) for v in (1, 2)]
 
 KINDS = {
