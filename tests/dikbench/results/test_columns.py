@@ -52,7 +52,7 @@ def test_a_store_of_the_first_release_is_read(stored: Path, tmp_path: Path, leni
 
 
 def test_a_run_continues_in_a_store_of_the_first_release(stored: Path, tmp_path: Path) -> None:
-    """What is there is kept, what is missing is run and timed, and the exports have today's names."""
+    """What is there is kept, what is missing is run and timed; exports have today's names."""
     folder = aged(stored, tmp_path / "old")
     before = read_results(stored).trials
     study = msgspec.convert(read_results(stored).manifest["study"], Study)
