@@ -145,14 +145,13 @@ def _stored_or_exported(
     folder: ResultsFolder, *, lenient: bool
 ) -> tuple[pd.DataFrame, dict[str, Any], list[str]]:
     notes: list[str] = []
-    exported = are_exported(folder.path)
-    if not exported or folder.database.is_file():
+    if folder.database.is_file():
         try:
             with folder.open_store() as store:
                 trials, manifest = store.trials(), store.manifest()
                 versions = sorted({_version(made) for made in store.environments()})
         except DikbenchError as error:
-            if not exported or not (lenient or isinstance(error, OtherVersion)):
+            if not are_exported(folder.path) or not (lenient or isinstance(error, OtherVersion)):
                 raise
             if lenient:
                 notes.append(f"Read from trials.csv, for the store cannot be read: {error}.")

@@ -109,7 +109,7 @@ def random_rows(
 
 def bare_rows(**columns: Sequence[object]) -> pd.DataFrame:
     """Make rows of one scenario, a formulation each, with little more than the columns given."""
-    frame = pd.DataFrame(columns)
+    frame = pd.DataFrame(columns).astype({"formulation": object})
     given = {
         "solver": "none", "scenario": "reach", "plant": "ideal", "reference": "time", "seed": 0,
         "status": "ok", "formulation_time_median_us": np.nan, "timing_stability": None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from dataclasses import dataclass
 from functools import lru_cache
@@ -18,7 +19,7 @@ from dikbench.programs.quadratic_program import QuadraticProgram
 from dikbench.solvers.catalogue.back_ends import Solver
 
 # What a solver thinks of its own accuracy is rechecked; a warning beside each would drown the run.
-warnings.filterwarnings("ignore", module=r"cvxpy\.|dikbench\.solvers\.modelled")
+warnings.filterwarnings("ignore", module=rf"cvxpy\.|{re.escape(__name__)}")
 
 
 class ModelledSolver:

@@ -226,7 +226,7 @@ def test_a_manifest_that_cannot_be_read_is_said(tmp_path: Path, manifest: str | 
 def test_a_damaged_folder_is_an_error_to_all_but_the_report(
     tmp_path: Path, harm: str, message: str
 ) -> None:
-    """Numbers are not compared or replayed in part: a line says what is wrong and who reads on."""
+    """Nothing is compared or replayed in part: one line says what is wrong and who reads on."""
     rows = make_rows({"pinv": {}, "dls": {}})
     if harm == "no selector":
         rows.loc[0, "formulation"] = "a[b="

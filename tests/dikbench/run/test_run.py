@@ -151,7 +151,8 @@ def test_seeds_differ_and_a_path_indexed_run_waits(results: Path) -> None:
         & (trials["plant"] == "ideal")
         & trials["scenario"].str.startswith("near-miss")
     ].set_index(["reference", "seed"])
-    assert lp.loc[("time", 0), "progress_min"] != lp.loc[("time", 1), "progress_min"]
+    progress = lp["progress_min"]
+    assert progress["time", 0] != progress["time", 1]
     errors = lp["position_error_max_m"]
     assert errors["path", 0] < 0.2 * errors["time", 0]
     assert lp["steps"]["path", 0] > lp["steps"]["time", 0]

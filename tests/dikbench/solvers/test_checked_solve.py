@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from makers.programs import LIBRARIES_WARN, no_point, scaling
 
-from dikbench.arrays import Array
 from dikbench.errors import CannotAnswer, DikbenchError, Infeasible, SolverFailed
 from dikbench.programs.answer import Answer
 from dikbench.programs.quadratic_program import QuadraticProgram
@@ -23,29 +23,7 @@ from dikbench.solvers.recheck.rechecked import RecheckedSteps
 from dikbench.solvers.recheck.residuals import residuals
 from dikbench.solvers.recheck.stack import Stack
 
-# The libraries warn beside each failure; `dikbench.solvers` silences them, pytest resets that.
-pytestmark = [
-    pytest.mark.filterwarnings(r"ignore::UserWarning:qpsolvers\."),
-    pytest.mark.filterwarnings(r"ignore::UserWarning:cvxpy\.|dikbench\.solvers\.modelled"),
-]
-
-
-def _scaling() -> tuple[QuadraticProgram, Array]:
-    """The shape of alpha scaling: max alpha, v = alpha (1, 4), |v| <= 2: alpha = 1/2."""
-    A = np.array([[1.0, 0.0, -1.0], [0.0, 1.0, -4.0]])
-    bounds = {"lb": np.array([-2.0, -2.0, 0.0]), "ub": np.array([2.0, 2.0, 1.0])}
-    program = QuadraticProgram(
-        np.zeros((3, 3)), np.array([0.0, 0.0, -1.0]), A=A, b=np.zeros(2), **bounds
-    )
-    return program, np.array([0.5, 2.0, 0.5])
-
-
-def _no_point() -> QuadraticProgram:
-    """x_1 + x_2 = 3 with |x_i| <= 1."""
-    A = np.array([[1.0, 1.0]])
-    return QuadraticProgram(
-        np.eye(2), np.zeros(2), A=A, b=np.array([3.0]), lb=-np.ones(2), ub=np.ones(2)
-    )
+pytestmark = LIBRARIES_WARN
 
 
 def _one_bound() -> QuadraticProgram:
@@ -152,7 +130,7 @@ def _judged(program: QuadraticProgram, answer: Answer) -> float:
 
 def test_the_distance_of_an_alpha_scaling_is_in_alpha() -> None:
     """Four fifths of the best alpha is 0.1 of 0.5 away, however far the velocities are."""
-    program, x = _scaling()
+    program, x = scaling()
     for share, distance in ((1.0, 0.0), (0.8, 0.1)):
         answer = Answer(share * x, True)
         assert _judged(program, answer) == pytest.approx(distance, abs=1e-6)
@@ -160,7 +138,7 @@ def test_the_distance_of_an_alpha_scaling_is_in_alpha() -> None:
 
 def test_without_a_judge_the_distance_is_not_known() -> None:
     """A program without a feasible point has no optimum to be far from."""
-    assert math.isnan(_judged(_no_point(), Answer(np.ones(2), True)))
+    assert math.isnan(_judged(no_point(), Answer(np.ones(2), True)))
 
 
 def test_the_judge_is_asked_where_nothing_is_proven() -> None:
@@ -191,7 +169,7 @@ def test_an_answer_that_is_not_claimed_is_not_handed_out() -> None:
     assert solve.checking_ns > 0
     solve.begin_step(1)
     with pytest.raises(Infeasible, match="no feasible point"):
-        solve(_no_point())
+        solve(no_point())
     assert solve.calls == 1
     assert solve.checking_ns > 0
     found = solve.rechecked()
@@ -371,7 +349,7 @@ def test_without_checks_nothing_is_kept() -> None:
     solve = CheckedSolve(_Script(_said(7.0, 0.0), Answer(None, False)), checks=False)
     assert solve(_one_bound()) == pytest.approx([7.0])
     with pytest.raises(SolverFailed):
-        solve(_no_point())
+        solve(no_point())
     found = solve.rechecked()
     assert (found.claimed.tolist(), found.verified.tolist()) == ([-1], [-1])
 

@@ -128,7 +128,7 @@ def test_selectors_stand_in_the_trial_as_they_were_given() -> None:
         (('"dls"', '"dls[damp=1]"'), ("damp", "valid: damping")),
         (('"dls"', '"qp"'), ("qp", "needs a solver")),
         (('"reach"', '"reech"'), ("reech", "did you mean 'reach'")),
-        (('"reach"', '"reach[distance=7]"'), ("distance=7", "0.01 to 0.3 [m]")),
+        (('"reach"', '"reach[distance=7]"'), ("distance=7", "must be 0.01 to 0.3")),
         (('"reach"', '"reach[robot=ur55]"'), ("ur55", "did you mean 'ur5'")),
         (("description", "seeds = [-1]\ndescription"), ("seeds",)),
         (("description", 'plants = ["perfect"]\ndescription'), ("perfect", "plant")),
@@ -155,10 +155,13 @@ def test_a_study_that_is_not_there_names_the_shipped_ones() -> None:
         load_study("quik")
 
 
-def test_a_timing_reference_that_needs_a_solver_is_an_error(write_study: WriteStudy) -> None:
+@pytest.mark.parametrize("reference", ["qp", "oracle"])
+def test_a_timing_reference_that_needs_a_solver_is_an_error(
+    write_study: WriteStudy, reference: str
+) -> None:
     """The formulation whose problems are replayed must be one that needs no solver."""
-    path = write_study(MINIMAL + '[timing]\nreference = "qp"\n')
-    with pytest.raises(DikbenchError, match="needs a solver"):
+    path = write_study(MINIMAL + f'[timing]\nreference = "{reference}"\n')
+    with pytest.raises(DikbenchError, match="must be a formulation that needs no solver"):
         expand(load_study(path))
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from makers.rows import random_rows
@@ -61,7 +62,7 @@ def test_a_failed_trial_counts_worst() -> None:
     trials.loc[0, "status"] = "diverged"
     points = contender_points(trials)
     assert points.loc["dls", "off_course"] == 60.0
-    assert round(points.loc["dls", "slow_down"], 6) == 33.333333
+    assert points.loc["dls", "slow_down"] == pytest.approx(100 / 3)
 
 
 def test_error_against_time_is_a_point_per_law_and_solver(drawn: list[Any], target: Path) -> None:

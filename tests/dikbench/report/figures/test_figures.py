@@ -19,7 +19,12 @@ from dikbench.report.figures.every import draw_figures
 from dikbench.results.columns import TIMES
 from dikbench.results.folder import ResultsFolder
 
-LAWS = ["dls[damping=0.1]", "dls[damping=0.2]", "dls[damping=0.3]", ("qp", "daqp")]
+LAWS: list[str | tuple[str, str]] = [
+    "dls[damping=0.1]",
+    "dls[damping=0.2]",
+    "dls[damping=0.3]",
+    ("qp", "daqp"),
+]
 SCENARIOS = [f"near-miss[miss={miss},speed={v}]" for miss in (0, 0.1, 0.2) for v in (1, 2)]
 
 KINDS = {
@@ -29,7 +34,7 @@ KINDS = {
     "error_against_miss_1.svg",
     "peak_speed_against_miss_1.svg",
     "off_course_against_slow_down.svg",
-    "law_dls_damping_1.svg",
+    "formulation_dls_damping_1.svg",
     "error_against_time_per_formulation.svg",
     "time_per_formulation_and_solver.svg",
 }
@@ -130,7 +135,7 @@ OUTCOME = {"phase_diagram_1_outcome.svg"}
     [
         (_none, set()),
         (_skipped, set()),
-        (_one_law, KINDS - {"law_dls_damping_1.svg"}),
+        (_one_law, KINDS - {"formulation_dls_damping_1.svg"}),
         (_one_trial, {*TIMED, "off_course_against_slow_down.svg"}),
         (_failed, {*OUTCOME, "time_per_formulation_and_solver.svg"}),
         (_only_saturating, KINDS),
@@ -167,7 +172,7 @@ def test_hostile_names_stay_text(tmp_path: Path) -> None:
     formulations = [f"{HOSTILE[0]}[../p<={value}]" for value in (1, 2, 3)] + HOSTILE[1:]
     scenarios = [f"{HOSTILE[1]}[<b>/../={value}]" for value in (1, 2, 3)]
     figures = drawn_in(tmp_path, random_rows(formulations, scenarios))
-    assert any("law_" in figure.file for figure in figures)
+    assert any("formulation_" in figure.file for figure in figures)
     written = ""
     for figure in figures:
         assert set(figure.file) <= set(file_name(figure.file[:-4]) + ".svg")
@@ -182,7 +187,7 @@ def test_hostile_names_stay_text(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("parts", "name"),
     [
-        (("formulation", "../../etc/passwd", 1), "law_etc-passwd_1"),
+        (("formulation", "../../etc/passwd", 1), "formulation_etc-passwd_1"),
         (("<script>",), "script"),
         (("a/b\\c\0d", "", 2), "a-b-c-d_2"),
         (("x" * 300,), "x" * 40),

@@ -10,6 +10,7 @@ import pytest
 from makers.rows import random_rows
 from matplotlib.collections import QuadMesh
 
+from dikbench.arrays import Array
 from dikbench.report.drawing.style import style
 from dikbench.report.figures.phase_diagram import draw_phase_diagrams, three_digits
 from dikbench.report.selection.categories import CATEGORIES, categories
@@ -22,10 +23,11 @@ GRID = [
 ]
 
 
-def cells(axis: Any, mesh: int = 0) -> np.ndarray[Any, Any]:
+def cells(axis: Any, mesh: int = 0) -> Array:
     """The values of a map, (speeds, misses), without the gap after miss = 0; NaN where none is."""
     found = [artist for artist in axis.collections if isinstance(artist, QuadMesh)][mesh]
-    return np.delete(np.ma.filled(found.get_array().astype(float), np.nan), 1, axis=1)
+    values: Any = found.get_array()
+    return np.delete(np.ma.filled(values.astype(float), np.nan), 1, axis=1)
 
 
 def test_cells_hold_what_the_table_says(drawn: list[Any], target: Path) -> None:

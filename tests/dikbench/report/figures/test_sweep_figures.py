@@ -96,7 +96,7 @@ def test_a_law_sweep_takes_the_median_error_and_the_worst_violation(
     assert (sweep.formulation, sweep.parameter) == ("dls", "damping")
     with style():
         (figure,) = draw_formulation_sweeps(trials, target)
-    assert figure.file == "law_dls_damping_1.svg"
+    assert figure.file == "formulation_dls_damping_1.svg"
     reach = trials[trials["scenario"].str.startswith("reach")]
     by_formulation = reach.groupby("formulation", sort=False)
     wanted = (

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from makers.rows import make_rows, write_results
+from makers.rows import Values, make_rows, write_results
 
 from dikbench.report.tables.table import Column, TableCell
 from dikbench.report.write import write_report
@@ -69,7 +69,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "formulation_time_p99_us": 12.0,
         "timing_stability": "stable",
     }
-    formulations = {
+    formulations: dict[str | tuple[str, str], Values] = {
         "pinv": {"position_error_rms_m": [0.003, 0.02, 0.1], **times},
         "dls[damping=0.1]": {"position_error_rms_m": 0.02, **times, "timing_stability": "drift"},
         ("qp", "daqp"): {

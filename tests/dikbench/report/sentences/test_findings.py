@@ -42,8 +42,9 @@ def test_laws_that_are_the_same_are_not_ranked() -> None:
     """Values that differ by less than 1 % are a tie, whoever comes first."""
     values = {"position_error_rms_m": 0.001}
     alike = {"position_error_rms_m": 0.001 * (1 + SAME / 2)}
-    for contenders in ({"a": values, "b": alike}, {"b": alike, "a": values}):
-        rows = make_rows(contenders, THREE)
+    for contenders in (("a", "b"), ("b", "a")):
+        said = {"a": values, "b": alike}
+        rows = make_rows({name: said[name] for name in contenders}, THREE)
         found = most_accurate(rows, Names(rows)).text
         assert found.startswith(
             " and ".join(f"`{name}`" for name in contenders) + ", not told apart,"

@@ -19,6 +19,7 @@ from dikbench.report.tables.csv_table import to_csv
 from dikbench.report.tables.files import write_table
 from dikbench.report.tables.kinds import KINDS, LIMIT_VIOLATION, TIMING, TRACKING_ERROR
 from dikbench.report.tables.table import Block, Table, TableCell
+from dikbench.results.selected import with_selected
 
 Rows = list[dict[str, str]]
 
@@ -210,7 +211,7 @@ def _synthetic(path: Path) -> Path:
                             "timing_stability": verdict if timed else None,
                         }
                     )
-    pd.DataFrame(rows).to_csv(path, index=False)
+    with_selected(pd.DataFrame(rows)).to_csv(path, index=False)
     return path
 
 

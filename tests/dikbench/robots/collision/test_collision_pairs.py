@@ -90,7 +90,8 @@ def test_distances_of_a_planar_arm_are_those_of_segments() -> None:
         for start, end in links:
             way = end - start
             t = np.clip((centre - start) @ way / (way @ way), 0, 1)
-            apart.append(np.linalg.norm(centre - start - t * way) - LINK_RADIUS - ball.radius)
+            away = float(np.linalg.norm(centre - start - t * way))
+            apart.append(away - LINK_RADIUS - ball.radius)
         apart += [segments_apart(*link, foot, head) - LINK_RADIUS - pole.radius for link in links]
         apart += [1.3 - max(start[0], end[0]) - LINK_RADIUS for start, end in links]
         assert pairs.distances(at(robot, q)) == pytest.approx(np.array(apart), abs=1e-6)
