@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from dikbench.arrays import Array
 from dikbench.plugins.building import make_formulation
@@ -43,9 +44,11 @@ def kinematics_at(robot: Robot, q: Array) -> Kinematics:
 
 
 def task_jacobian(robot: Robot, q: Array) -> Array:
-    """The Jacobian of the task frame in the rows that the robot can move, computed again."""
-    J: Array = kinematics_at(robot, q).jacobian(robot.frame_id)[list(robot.task_rows)]
-    return J
+    """The Jacobian of the task frame in the rows that the robot can move, by Pinocchio alone."""
+    J: Array = pin.computeFrameJacobian(
+        robot.model, robot.model.createData(), q, robot.frame_id, pin.LOCAL
+    )
+    return J[list(robot.task_rows)]
 
 
 def equation(J: Array, V: Array, priority: int = 1) -> LinearizedTask:
@@ -119,14 +122,14 @@ def limits_at_distances(
         nv=n,
         q_index=np.arange(n),
         position=Interval(-below, above),
-        velocity=_interval(velocity, n),
-        acceleration=_interval(acceleration, n),
+        velocity=interval_of(velocity, n),
+        acceleration=interval_of(acceleration, n),
         effort=None,
     )
     return joint.at(np.zeros(n))
 
 
-def _interval(value: object, n: int) -> Interval | None:
+def interval_of(value: object, n: int) -> Interval | None:
     """A pair (lower, upper), a symmetric magnitude, or None."""
     if value is None:
         return None

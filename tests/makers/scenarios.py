@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from dikbench.arrays import Array
@@ -15,13 +16,21 @@ from dikbench.metrics import evaluate, motion_of
 from dikbench.plugins.building import make_formulation, make_plant, make_scenario
 from dikbench.problem import DikProblem, Formulation, PoseTask, Solve
 from dikbench.robots.catalogue import load_robot
-from dikbench.robots.robot import Robot
-from dikbench.scenario import Certificate, Scenario, joint_path
+from dikbench.scenario import (
+    Certificate,
+    Robot,
+    Scenario,
+    Singularity,
+    analyse,
+    joint_path,
+    make_singular,
+)
 from dikbench.scenario.plant import Ideal, Plant
 from dikbench.simulation.closed_loop import Run, simulate
 from dikbench.simulation.status import Status
 from dikbench.solvers.checked_solve import CheckedSolve, make_solve
 from makers.problems import solve_for
+from scenarios.singular_postures import SINGULAR_POSTURES, SingularPosture
 
 RATE = np.array([0.5, -0.4, 0.6])
 """Of the joints of `planar_scenario` [rad/s]."""
@@ -65,8 +74,7 @@ class Recording:
 
 def exact(problem: DikProblem) -> Array:
     """The velocity that does the task."""
-    v: Array = np.linalg.solve(problem.primary.J, problem.primary.V)
-    return v
+    return np.linalg.solve(problem.primary.J, problem.primary.V).astype(np.float64, copy=False)
 
 
 def at_step(k: int, wrong: Callable[[], Any]) -> Callable[[DikProblem], Any]:
@@ -120,7 +128,15 @@ def scenario_error(selector: str) -> str:
     return error_of(make_scenario, selector)
 
 
-def put_robot(monkeypatch: pytest.MonkeyPatch, robot: Robot) -> None:
+def put_robot(monkeypatch: pytest.MonkeyPatch, robot: object) -> None:
     """Let every family find this robot, whatever the name that it asks for."""
     module = sys.modules["dikbench.scenario.family"]
     monkeypatch.setattr(module, "load_robot", lambda name, frame: robot)
+
+
+def known_singularity(robot: str, name: str) -> tuple[Robot, Singularity]:
+    """A robot, and its singular configuration of a name in `SINGULAR_POSTURES`."""
+    arm = load_robot(robot)
+    postures: Mapping[Any, SingularPosture] = SINGULAR_POSTURES[robot]
+    near = pin.integrate(arm.model, pin.neutral(arm.model), np.array(postures[name].posture))
+    return arm, analyse(arm, make_singular(arm, near))

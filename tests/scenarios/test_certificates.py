@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable
-
 import numpy as np
 import pinocchio as pin
 import pytest
+from makers.scenarios import put_robot
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
@@ -276,6 +274,7 @@ def test_acceleration_limits_are_in_force_only_where_asked_for(name: str) -> Non
     off, on = make_scenario(name), make_scenario(f"{name}[acceleration=true]")
     assert off.robot.limits.acceleration is None
     assert on.robot.limits.acceleration is not None
+    assert on.robot.available_acceleration is not None
     assert np.array_equal(on.robot.limits.acceleration.upper, on.robot.available_acceleration)
     assert np.array_equal(on.robot.limits.acceleration.lower, -on.robot.limits.acceleration.upper)
 
@@ -331,19 +330,17 @@ def test_impossible_scenarios_are_errors_of_one_line(selector: str, parts: list[
 
 def test_a_limit_that_cannot_be_reached_fails_loudly(monkeypatch: pytest.MonkeyPatch) -> None:
     """A joint that starts with no room before its limit, or a robot without limits: one line."""
-    module = sys.modules["dikbench.scenario.family"]
-    load: Callable[..., Robot] = module.load_robot
-    position = load("ur5").limits.position
+    position = load_robot("ur5").limits.position
     assert position is not None
     # The shoulder of the posture would start beyond its limit: the certificate says so.
     upper = position.upper.copy()
     upper[1] = -1.3
-    narrow = load("ur5").with_limits(position=(position.lower, upper))
+    narrow = load_robot("ur5").with_limits(position=(position.lower, upper))
     for robot, words in (
         (narrow, "position margin at the start"),
-        (load("ur5").with_limits(position=None), "robot ur5 has no limits"),
+        (load_robot("ur5").with_limits(position=None), "robot ur5 has no limits"),
     ):
-        monkeypatch.setattr(module, "load_robot", lambda name, frame, robot=robot: robot)
+        put_robot(monkeypatch, robot)
         with pytest.raises(DikbenchError, match=words) as caught:
             make_scenario("joint-limit-crossing")
         assert "\n" not in str(caught.value)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pinocchio as pin
 import pytest
+from makers.scenarios import metrics_of, run_of
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
@@ -26,8 +26,6 @@ from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, parse_solver
 from dikbench.solvers.checked_solve import make_solve
 from scenarios.humanoid import FEET
 
-Metrics = Callable[..., dict[str, float]]
-
 
 @cache
 def standing() -> Scenario:
@@ -37,11 +35,7 @@ def standing() -> Scenario:
 
 def run(law: str, scenario: Scenario) -> Array:
     """The configurations of a time-indexed run in which every step is answered, (n + 1, nq)."""
-    formulation = make_formulation(law)
-    program = program_of(formulation)
-    solve = make_solve(None if program is None else parse_solver("daqp"), program)
-    done = simulate(scenario, formulation, solve, Ideal())
-    assert done.status is Status.OK
+    done = run_of(law, scenario)
     assert done.trace.share(Status.OK) == 1
     return done.trace.q
 
@@ -140,10 +134,10 @@ def test_every_law_runs_on_a_free_base(law: str) -> None:
     assert done.trace.share(Status.NOT_VERIFIED) == done.trace.share(Status.SOLVER_FAILED) == 0
 
 
-def test_weights_give_way_where_priorities_do_not(metrics: Metrics) -> None:
+def test_weights_give_way_where_priorities_do_not() -> None:
     """The centre of mass, below the hand: kept by levels, given up by a hundredth of the weight."""
     scenario = make_scenario("humanoid[laps=1]")
-    strict, weighted = (metrics(law, scenario) for law in ("hqp", "qp"))
+    strict, weighted = (metrics_of(law, scenario) for law in ("hqp", "qp"))
     assert strict["second_task_error_rms"] < 1e-4
     assert weighted["second_task_error_rms"] > 50 * strict["second_task_error_rms"]
     assert weighted["position_error_max_m"] < 3e-3

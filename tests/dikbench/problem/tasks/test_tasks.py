@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 
@@ -362,7 +363,7 @@ def test_a_centre_of_mass_needs_three_finite_numbers(target: object) -> None:
 
 
 def _weighted(kind: str, robot: Robot, weight: object) -> LinearizedTask:
-    task: Task = {
+    makers: dict[str, Callable[[], Task]] = {
         "posture": lambda: PostureTask(robot.q0 + 0.1, weight=weight),  # type: ignore[arg-type]
         "damping": lambda: DampingTask(weight=weight),  # type: ignore[arg-type]
         "centre": lambda: CentreOfMassTask(np.ones(3), weight=weight),  # type: ignore[arg-type]
@@ -372,8 +373,8 @@ def _weighted(kind: str, robot: Robot, weight: object) -> LinearizedTask:
         ),
         "position": lambda: PositionTask(np.ones(3), weight=weight),  # type: ignore[arg-type]
         "orientation": lambda: OrientationTask(np.eye(3), weight=weight),  # type: ignore[arg-type]
-    }[kind]()
-    return task.linearize(_at(robot, robot.q0 + 0.2))
+    }
+    return makers[kind]().linearize(_at(robot, robot.q0 + 0.2))
 
 
 KINDS = {"posture": 7, "damping": 7, "centre": 3, "pose": 6, "position": 3, "orientation": 3}
@@ -437,6 +438,7 @@ def test_the_log_derivative_of_a_stack_is_block_diagonal() -> None:
     assert Jl is not None
     assert Jl.shape == (13, 13)
     assert np.array_equal(Jl[:7, :7], np.eye(7))
+    assert pose.log_derivative is not None
     assert np.array_equal(Jl[7:, 7:], pose.log_derivative)
     assert np.all(Jl[:7, 7:] == 0)
     assert np.all(Jl[7:, :7] == 0)
