@@ -11,7 +11,7 @@ Mask = npt.NDArray[np.bool_]
 
 
 def plain(array: Array) -> Array:
-    """The array, or a copy of one that is read-only, strided or in columns.
+    """Return the array, or a copy of one that is read-only, strided or column-major.
 
     Some libraries take no such array, others take it for a plain one.
     """

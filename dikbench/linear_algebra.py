@@ -17,18 +17,18 @@ ILL_CONDITIONED = 1e-4
 
 
 def thin_svd(A: Array) -> tuple[Array, Array, Array]:
-    """U (m, k), singular values (k,) falling, V^T (k, n) of A (m, n), k = min(m, n)."""
+    """Compute U (m, k), falling singular values (k,) and V^T (k, n) of A (m, n), k = min(m, n)."""
     U, singular, Vt, _ = dgesdd(A, full_matrices=0)
     return U, singular, Vt
 
 
 def rank(singular: Array, tolerance: float) -> int:
-    """How many of the singular values (k,), falling, are above a tolerance; NaN counts as above."""
+    """Count the falling singular values (k,) above a tolerance; NaN counts as above."""
     return len(singular) - int(np.count_nonzero(singular <= tolerance))
 
 
 def pseudo_inverse(A: Array, tolerance: float) -> Array:
-    """Moore-Penrose inverse (n, m) of A (m, n), singular values up to `tolerance` taken as zero.
+    """Compute the Moore-Penrose inverse (n, m) of A (m, n).
 
     The tolerance is absolute, in the units of A: a relative one blows up where A itself vanishes.
     """
@@ -39,7 +39,7 @@ def pseudo_inverse(A: Array, tolerance: float) -> Array:
 
 
 def least_norm(A: Array, b: Array, tolerance: float) -> Array:
-    """The shortest least-squares solution of A x = b, (n,): `pseudo_inverse` times b (m,)."""
+    """Compute the shortest least-squares solution (n,) of A x = b: `pseudo_inverse` times b."""
     U, singular, Vt = thin_svd(A)
     k = rank(singular, tolerance)
     x: Array = (b.dot(U[:, :k]) / singular[:k]).dot(Vt[:k])
@@ -47,7 +47,7 @@ def least_norm(A: Array, b: Array, tolerance: float) -> Array:
 
 
 def damped_least_squares(A: Array, b: Array, squared_damping: float) -> Array:
-    """The minimiser (n,) of ||A x - b||^2 + lambda^2 ||x||^2 for A (m, n), b (m,).
+    """Compute the minimiser (n,) of ||A x - b||^2 + lambda^2 ||x||^2 for A (m, n), b (m,).
 
     The smaller of the two Gram matrices is factorised: A A^T where the rows are fewer, else A^T A.
     Where that would lose more than half of the digits, (almost) undamped at a singularity, the
@@ -67,20 +67,20 @@ def damped_least_squares(A: Array, b: Array, squared_damping: float) -> Array:
 
 @lru_cache(maxsize=64)
 def scaled_identity(n: int, scale: float) -> Array:
-    """The matrix scale I, (n, n), made once: to be read, not written to."""
+    """Return the matrix scale I, (n, n), made once and read-only."""
     matrix: Array = np.eye(n) * scale
     matrix.flags.writeable = False
     return matrix
 
 
 def solve_positive_definite(A: Array, b: Array) -> Array | None:
-    """X with A x = b for a symmetric positive definite A (n, n); None where A is not."""
+    """Solve A x = b for a symmetric positive definite A (n, n); None where A is not."""
     _, x, info = dposv(A, b)
     return x if info == 0 else None
 
 
 def null_space(A: Array, tolerance: float) -> Array:
-    """An orthonormal basis of the null space of A (m, n), as columns (n, n - rank).
+    """Compute an orthonormal basis of the null space of A (m, n), columns (n, n - rank).
 
     Singular values up to `tolerance` (absolute, in the units of A) are taken as zero.
     """
@@ -104,7 +104,7 @@ class DampedInverse:
         self._damped = self._singular**2 + damping**2
 
     def times(self, b: Array) -> Array:
-        """A^# b, (n,)."""
+        """Compute A^# b, (n,)."""
         gain = np.divide(
             self._singular, self._damped, out=np.zeros_like(self._damped), where=self._kept
         )
@@ -112,7 +112,7 @@ class DampedInverse:
         return x
 
     def taken(self, projector: Projector) -> Array:
-        """What A takes of the space of v, (n, n): I minus it is what A leaves free.
+        """Compute the part of the velocity space that A uses, (n, n); I minus it is left free.
 
         Args:
             projector: "exact": A^+ A, the orthogonal projector onto the row space of A; "damped":
@@ -129,7 +129,7 @@ class DampedInverse:
 
 
 def inverse_and_row_space(A: Array, tolerance: float, damping: float = 0.0) -> tuple[Array, Array]:
-    """The (damped) inverse (n, m) of A (m, n), and an orthonormal basis (r, n) of A's row space.
+    """Compute the (damped) inverse (n, m) of A (m, n) and an orthonormal row basis (r, n).
 
     Singular values s up to the (absolute) tolerance count as zero, r are above it; their inverse is
     s / (s^2 + damping^2). I - basis^T basis projects onto the null space of A, damped or not.
@@ -142,7 +142,7 @@ def inverse_and_row_space(A: Array, tolerance: float, damping: float = 0.0) -> t
 
 
 def volume(A: Array) -> float:
-    """The square root of det(A A^T) for A (m, n), the product of its singular values if m <= n.
+    """Compute sqrt(det(A A^T)) of A (m, n), the product of its singular values if m <= n.
 
     From the triangle R of A^T = Q R: a Gram matrix would lose half of the digits.
     """

@@ -46,7 +46,7 @@ class Range:
     also: tuple[float, ...] = ()
 
     def holds(self, value: Any) -> bool:
-        """Whether a value is a number of this range (NaN and infinity are in none)."""
+        """Say whether a value is a number of this range (NaN and infinity are in none)."""
         if not isinstance(value, Real):
             return False
         number = float(value)
@@ -270,7 +270,7 @@ def _read(plugin: type, field: dataclasses.Field[Any]) -> Parameter:
 
 
 def _hints(plugin: type, name: str) -> Iterator[Any]:
-    """The types that a class and its bases declare for a field, its own first.
+    """Yield the types that a class and its bases declare for a field, its own first.
 
     Each is resolved by itself, where it was written: a name that is imported for type checkers only
     gives None and spoils no other one.
@@ -288,7 +288,7 @@ def _hints(plugin: type, name: str) -> Iterator[Any]:
 
 
 def _marker(hints: list[Any], kind: type[Marker]) -> Marker | None:
-    """The first marker of a kind in some annotations: a new default keeps the range of a base."""
+    """Return the first marker of a kind: a field with a new default keeps its base's range."""
     for hint in hints:
         for marker in getattr(hint, "__metadata__", ()):
             if isinstance(marker, kind):

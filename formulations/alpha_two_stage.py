@@ -71,7 +71,7 @@ class AlphaTwoStage(Parameters):
 
 
 def posture_velocity(problem: DikProblem) -> Array:
-    """The wanted velocity of the problem's first posture task, (nv,) [rad/s]; else zero."""
+    """Return the desired velocity of the first posture task, (nv,) [rad/s]; else zero."""
     for task in problem.tasks:
         if isinstance(task, LinearizedJointTask) and task.error.any():  # not one of damping
             return task.V

@@ -75,7 +75,7 @@ class ConditionGovernor(Parameters):
         return v if self.after == "none" or limit is None else scaled(v, limit)
 
     def _scale(self, robot: Robot, q: Array, v: Array) -> float:
-        """The factor c for a velocity (nv,) at a configuration (nq,)."""
+        """Compute the factor c for a velocity (nv,) at a configuration (nq,)."""
         rows, data = list(robot.task_rows), robot.scratch
         pin.computeJointJacobiansTimeVariation(robot.model, data, q, v)
         local = (robot.model, data, robot.frame_id, pin.LOCAL)

@@ -69,5 +69,5 @@ class DisplacementQp(Parameters):
 
 
 def _braking(distance: Array, deceleration: Array, dt: float) -> Array:
-    """sqrt(2 a d), (nv,) [rad/s]; no bound outside a limit, where the box asks for the way back."""
+    """Compute sqrt(2 a d), (nv,) [rad/s]; infinite outside, where the box leads back."""
     return np.where(distance < 0, np.inf, sqrt_brake(distance, deceleration, dt))

@@ -75,7 +75,7 @@ class Drake(Parameters):
 
 
 def posture_error(problem: DikProblem) -> Array:
-    """q_nom - q of the problem's first posture task, (nv,) [rad]; zero where there is none."""
+    """Return q_nom - q of the first posture task, (nv,) [rad]; zero where there is none."""
     for task in problem.tasks:
         if isinstance(task, LinearizedJointTask) and task.error.any():  # not one of damping
             return task.error
@@ -83,5 +83,5 @@ def posture_error(problem: DikProblem) -> Array:
 
 
 def angular_first(J: Array) -> Array:
-    """The rows of a pose's Jacobian in Drake's order."""
+    """Put the rows of a pose's Jacobian (6, nv) in Drake's order (angular; linear)."""
     return np.roll(J, 3, axis=0) if len(J) == 6 else J

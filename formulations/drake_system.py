@@ -74,7 +74,7 @@ class DrakeSystem(Parameters):
 
 
 def _in_world_axes(problem: DikProblem, J: Array) -> Array:
-    """The Jacobian of a pose (6, nv) in the axes of the world; any other task's as it is."""
+    """Turn a pose's Jacobian (6, nv) into the axes of the world; leave any other one."""
     if len(J) != 6:
         return J
     robot = problem.robot
@@ -84,7 +84,7 @@ def _in_world_axes(problem: DikProblem, J: Array) -> Array:
 
 
 def scaled_bounds(limits: Limits) -> tuple[Array, Array]:
-    """Velocity bounds (nv,) [rad/s], the one towards the nearer position limit scaled down."""
+    """Compute velocity bounds (nv,) [rad/s], the one towards the nearer limit scaled down."""
     velocity = limits.joint.velocity
     if velocity is None:
         n = limits.joint.nv

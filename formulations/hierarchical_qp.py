@@ -99,7 +99,7 @@ class HierarchicalQp(Parameters):
 def _level(
     A: Array, r: Array, v: Array, N: Array, box: Box, damping: float, problem: DikProblem
 ) -> QuadraticProgram:
-    """Min 1/2 ||A z - r||^2 + 1/2 damping^2 ||v + N z||^2 s.t. the limits on v + N z, in z."""
+    """Pose the program of one level in z, the limits on v + N z."""
     k = N.shape[1]
     P = A.T @ A + damping**2 * np.eye(k)  # N is orthonormal
     q = -A.T @ r + damping**2 * (N.T @ v)

@@ -61,7 +61,7 @@ class JointCentering(Parameters):
 
 
 def distance_to_middle(limits: Limits) -> Array | None:
-    """q_mid - q [rad or m], (nv,), 0 where a joint has not both limits; None: none in force."""
+    """Compute q_mid - q, (nv,) [rad or m]; None where no limits are in force."""
     if limits.joint.middle is None or limits.coordinates is None:
         return None
     distance: Array = limits.joint.middle - limits.coordinates

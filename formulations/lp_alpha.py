@@ -61,7 +61,7 @@ class LpAlpha(Parameters):
 
 
 def regularization_for(task: LinearizedTask, given: float | None) -> float:
-    """The weight rho: as given, else 1e-4 where the task leaves joints free and 0 elsewhere."""
+    """Return rho: as given, else 1e-4 where the task leaves joints free and 0 elsewhere."""
     if given is not None:
         return given
     m, n = task.J.shape
@@ -75,7 +75,7 @@ def alpha_program(
     G: Array | None = None,
     h: Array | None = None,
 ) -> QuadraticProgram:
-    """The program of `LpAlpha` in matrices, in x = (v, alpha), shape (nv + 1,)."""
+    """Pose the program of `LpAlpha` in matrices, in x = (v, alpha), shape (nv + 1,)."""
     m, n = task.J.shape
     P = np.zeros((n + 1, n + 1))
     P.flat[: n * (n + 2) : n + 2] = regularization

@@ -79,7 +79,7 @@ class LpAlphaComponents(Parameters):
 
 
 def _rows(task: LinearizedTask, rows: tuple[int, ...]) -> list[int]:
-    """The rows of the twist that a task is about: a whole pose, a position or an orientation."""
+    """Return the twist's rows of a task: a whole pose, a position or an orientation."""
     turns = isinstance(task, LinearizedOrientation)
     part = [row for row in rows if (row >= 3) == turns]
     for kept in (list(rows), part):
@@ -89,7 +89,7 @@ def _rows(task: LinearizedTask, rows: tuple[int, ...]) -> list[int]:
 
 
 def twist_from_rates(rotation: Array) -> Array:
-    """E (6, 6): rates of x, y, z, roll, pitch, yaw in the world to a body twist (linear; angular).
+    """Compute E (6, 6): world rates of x, y, z, roll, pitch, yaw to a body twist.
 
     Args:
         rotation: R = Rz(yaw) Ry(pitch) Rx(roll), (3, 3).

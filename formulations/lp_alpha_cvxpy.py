@@ -69,7 +69,7 @@ class LpAlphaCvxpy(Parameters):
 def _compiled(
     m: int, below: tuple[bool, ...], above: tuple[bool, ...], rho: float
 ) -> tuple[Any, tuple[Any, Any], dict[str, Any]]:
-    """The model for a task of m rows, its unknowns and its parameters.
+    """Compile the model of a task of m rows; return it, its unknowns and its parameters.
 
     `below` and `above` say, joint by joint, which velocities are bounded at all.
     """

@@ -8,7 +8,7 @@ from dikbench.problem import Array
 
 
 def lu_kernel(A: Array) -> Array:
-    """A basis of the kernel of A (m, n), as columns (n, n - rank): what Eigen's FullPivLU returns.
+    """Compute the kernel of A (m, n), columns (n, n - rank), as Eigen's FullPivLU does.
 
     Gaussian elimination with the largest remaining entry as pivot (the first one column by column
     where several are equal) parts the columns into pivots and free ones; each basis vector has a

@@ -96,7 +96,7 @@ class Neo(Parameters):
         return x[:n]
 
     def _bounds(self, limits: Limits) -> tuple[Array, Array]:
-        """Velocity limits and dampers, (nv,) [rad/s]; never beyond a standstill from outside."""
+        """Compute velocity limits with dampers, (nv,) [rad/s]; at least rest from outside."""
         n, velocity = limits.joint.nv, limits.joint.velocity
         lower = np.full(n, -np.inf) if velocity is None else velocity.lower
         upper = np.full(n, np.inf) if velocity is None else velocity.upper
@@ -106,7 +106,7 @@ class Neo(Parameters):
         return lower, upper
 
     def _damper(self, distance: Array, free: Array) -> Array:
-        """The speed allowed towards a limit at a distance, (nv,) [rad/s]."""
+        """Compute the speed allowed towards a limit at a distance, (nv,) [rad/s]."""
         share = (distance - self.stop_distance) / (self.influence_distance - self.stop_distance)
         slowed = self.damper_gain * np.maximum(share, 0.0)
         return np.where(distance < self.influence_distance, slowed, free)

@@ -8,7 +8,7 @@ from dikbench.problem import Array, Box, DikProblem
 
 
 def limits_about(v: Array, N: Array, box: Box, problem: DikProblem) -> tuple[Array, Array]:
-    """Rows (p, k) and bounds (p,) on z that keep v + N z where a law has to keep it.
+    """Compute rows (p, k) and bounds (p,) on z that keep v + N z inside the limits.
 
         lo <= v + N z <= hi,   G (v + N z) <= h
 

@@ -57,5 +57,5 @@ class PseudoInverse(Parameters):
 
 
 def scaled(v: Array, limit: Interval) -> Array:
-    """The longest s v, s <= 1, inside the limits, (nv,)."""
+    """Scale v (nv,) by the largest s <= 1 that keeps it inside the limits."""
     return v / max(1.0, float(limit.usage(v).max()))

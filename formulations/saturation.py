@@ -44,7 +44,7 @@ class _Held(NamedTuple):
 def saturated_levels(
     problem: DikProblem, box: Box, rank_tolerance: float, *, optimal: bool
 ) -> Array:
-    """Every priority level in turn, each in the null space of those above, inside the box.
+    """Do every priority level in the null space of those above, inside the box.
 
     Where the box excludes rest, as under acceleration limits in motion, the least velocity may have
     so many joints outside it that no saturation helps: then the least change of velocity.
@@ -72,7 +72,7 @@ def saturated_levels(
 def _saturated(
     level: LinearizedTask, start: Array, N: Array, box: Box, tolerance: float, *, optimal: bool
 ) -> Array | None:
-    """The velocity of one level from `start` in the range of the projector N; None: none found."""
+    """Find the velocity of one level from `start` in the range of the projector N, or None."""
     bounds: dict[int, float] = {}  # of the saturated joints
     rank = None
     best, best_scale = None, -1.0
@@ -106,13 +106,13 @@ def _saturated(
 
 
 def _inside(v: Array, box: Box) -> Array:
-    """The velocity without what sticks out of the box, which is rounding; faster than `np.clip`."""
+    """Clip rounding errors to the box (nv,); faster than `np.clip`."""
     held: Array = np.minimum(np.maximum(v, box.lower), box.upper)
     return held
 
 
 def _hold(bounds: dict[int, float], start: Array, N: Array) -> _Held | None:
-    """Saturate joints, by least motion in the range of N; None where that leaves no way to."""
+    """Hold joints at their bounds by least motion in the range of N; None if impossible."""
     if not bounds:
         return _Held(start, N, np.empty((len(start), 0)))
     joints = list(bounds)
@@ -126,7 +126,7 @@ def _hold(bounds: dict[int, float], start: Array, N: Array) -> _Held | None:
 
 
 def _scale(a: Array, b: Array, box: Box, bounds: dict[int, float]) -> tuple[float, int | None]:
-    """The largest scale s <= 1 with a s + b in the box, and the joint to saturate next.
+    """Compute the largest scale s <= 1 with a s + b in the box, and the joint to hold next.
 
     The scale is -1 where there is none that is not negative. The joint is, among those that are
     outside at s = 1, the one that allows the least; None where none is.
@@ -151,7 +151,7 @@ def _scale(a: Array, b: Array, box: Box, bounds: dict[int, float]) -> tuple[floa
 def _wrong_side(
     v: Array, effect: Array, done: Array, box: Box, bounds: dict[int, float]
 ) -> list[int]:
-    """The saturated joints whose coming off the bound would make the motion smaller.
+    """List the held joints whose coming off the bound would make the motion smaller.
 
     The multipliers of the bounds in min 1/2 ||v||^2: the derivative of ||v||^2/2 by each bound.
     """

@@ -68,6 +68,6 @@ class SelectiveDamping(Parameters):
 
 
 def _lengths(columns: Array, starts: list[int]) -> Array:
-    """Of each column (m, n) the sum of the norms of its blocks, (n,), that start at these rows."""
+    """Sum the norms of each column's blocks, which start at these rows, (m, n) -> (n,)."""
     lengths: Array = np.sqrt(np.add.reduceat(columns**2, starts)).sum(axis=0)
     return lengths

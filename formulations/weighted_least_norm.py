@@ -47,7 +47,7 @@ class WeightedLeastNorm(Parameters):
 
 
 def mobility(to_lower: Array, to_upper: Array, v_prev: Array) -> Array:
-    """1/w, (nv,), from the distances to the limits and the motion before, (nv,) each."""
+    """Compute 1/w, (nv,), from the distances to the limits and the last velocity, (nv,)."""
     with np.errstate(invalid="ignore"):  # infinite distances
         outwards = v_prev * (to_lower - to_upper) > 0
         room = 4 * (to_lower * to_upper) ** 2

@@ -75,7 +75,7 @@ def _followed(
     times: list[float],
     file: str,
 ) -> Array:
-    """Configurations (k + 1, nq) along the path, the first from the robot's own start."""
+    """Solve configurations (k + 1, nq) along the path, the first from the robot's start."""
     q = [arm.q0]
     for tau in instants:
         try:

@@ -118,7 +118,7 @@ class Humanoid(Family):
 
 
 def _feet(body: Robot, q0: Array, gain: float) -> tuple[PoseTask, ...]:
-    """The tasks of feet that stay where they are at the start."""
+    """Make the tasks of feet that stay where they are at the start."""
     return tuple(
         PoseTask(placement, gain, FEET_WEIGHT, 1, foot)
         for foot, placement in zip(FEET, _soles(body, q0), strict=True)
@@ -126,14 +126,14 @@ def _feet(body: Robot, q0: Array, gain: float) -> tuple[PoseTask, ...]:
 
 
 def _soles(body: Robot, q: Array) -> list[Any]:
-    """The placements of the feet (`pinocchio.SE3`)."""
+    """Compute the placements of the feet (`pinocchio.SE3`)."""
     return [placement_of(replace(body, frame=foot), q) for foot in FEET]
 
 
 def _measured(
     body: Robot, motion: OracleMotion, together: TrackingTogether
 ) -> tuple[float, float, float]:
-    """Of a motion with the feet in place: what its certificate says of the whole body.
+    """Measure what the certificate says of the whole body, with the feet in place.
 
     The smallest singular value of the stacked Jacobian of hand and feet (m, rad); the farthest that
     a foot is from its place (m, rad); how far the centre of mass stays inside the rectangle about

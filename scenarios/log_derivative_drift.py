@@ -76,7 +76,7 @@ class LogDerivativeDrift(Family):
             return poses[min(int(tau / period + 1e-9), 3) % 2]  # the last one stays to the end
 
         def straight(tau: float) -> Array:
-            """Each leg as a constant motion in x, y and yaw, in half of the time that it has."""
+            """Move each leg at constant rates of x, y and yaw, in half of its time."""
             leg = min(int(tau / period), 3)
             if leg == 0:
                 return q0
@@ -103,6 +103,6 @@ class LogDerivativeDrift(Family):
 
 
 def _length(screw: pin.Motion) -> float:
-    """Length of the way of the origin along a screw motion [m]."""
+    """Compute the path length of the origin along a screw motion [m]."""
     way = np.array([pin.exp6(share * screw).translation for share in np.linspace(0.0, 1.0, 101)])
     return float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())

@@ -120,7 +120,7 @@ class NearMiss(Family):
 
 
 def _known(robot: str, singularity: SingularityName | Literal["auto"]) -> SingularPosture:
-    """The posture of a name; of `auto`, the robot's first."""
+    """Return the posture of a name; of `auto`, the robot's first."""
     postures = SINGULAR_POSTURES.get(robot, {})
     if singularity == "auto":
         return next(iter(postures.values()))
@@ -133,7 +133,7 @@ def _known(robot: str, singularity: SingularityName | Literal["auto"]) -> Singul
 
 
 def _perturbed(arm: Robot, q: Array, change: Perturbation) -> Singularity:
-    """The singularity next to a singular posture (nq,), moved as the seed says, passed alike."""
+    """Find the singularity next to the posture q (nq,) that the seed moves."""
     nominal, moved = analyse(arm, q), change.posture(arm, q)
     if moved is q:
         return nominal
@@ -141,7 +141,7 @@ def _perturbed(arm: Robot, q: Array, change: Perturbation) -> Singularity:
 
 
 def _first_found(arm: Robot, miss: float, speed: float, change: Perturbation) -> _Passage:
-    """Past the first singular posture, from the robot's start outwards, that certifies."""
+    """Pass the first singular posture, from the robot's start outwards, that certifies."""
     reason = "none is inside the position limits"
     for q in singular_postures(arm, 2 * MARGIN):
         try:
@@ -165,7 +165,7 @@ def _first_found(arm: Robot, miss: float, speed: float, change: Perturbation) ->
 def _passage(
     arm: Robot, where: Singularity, miss: float, speed: float, half_length: float
 ) -> _Passage:
-    """The first way past a singularity that can be followed inside the position limits."""
+    """Find the first path past a singularity that can be followed inside the limits."""
     if where.kind != "crossing":
         TOUCHED.check("miss", miss)
     if where.kind == "crossing" and where.growth.max() < LEAST_GROWTH:
@@ -192,7 +192,7 @@ def _passage(
 
 
 def _straight_through(arm: Robot, where: Singularity, speed: float, half_length: float) -> _Passage:
-    """The motion of the single joint that leads out fastest, from one side to the other."""
+    """Move the single joint that leads out fastest from one side to the other."""
     reference, start = next(_crossings(arm, where, 0.0, speed, half_length))
     q_r, _ = at_constant_rate(arm, start, speed * _way_out(where))
     motion = joint_oracle(arm, q_r, _instants(half_length, 0.0, reference.duration))
@@ -200,7 +200,7 @@ def _straight_through(arm: Robot, where: Singularity, speed: float, half_length:
 
 
 def _way_out(where: Singularity) -> Array:
-    """The unit velocity (nv,) of the joint that makes the smallest singular value grow fastest."""
+    """Return the unit velocity (nv,) of the joint along which sigma_min grows fastest."""
     out = np.zeros(len(where.growth))
     out[np.argmax(where.growth)] = 1.0
     return out
@@ -209,7 +209,7 @@ def _way_out(where: Singularity) -> Array:
 def _crossings(
     arm: Robot, where: Singularity, miss: float, speed: float, half_length: float
 ) -> Iterator[tuple[Reference, Array]]:
-    """Paths along the joint that leads out fastest, on either side, and seeds of their starts."""
+    """Yield paths along the joint that leads out fastest, on either side, and seeds."""
     out, twist = _way_out(where), np.zeros(6)
     twist[list(arm.task_rows)] = where.jacobian @ out
     seed = pin.integrate(arm.model, where.q, -half_length * out)
@@ -221,7 +221,7 @@ def _crossings(
 def _folds(
     arm: Robot, where: Singularity, miss: float, speed: float, half_length: float
 ) -> Iterator[tuple[Reference, Array]]:
-    """The path from inside towards the edge and back, and the two ways to bend for it."""
+    """Yield the path from inside to the edge and back, with each of two ways to bend."""
     inward, half = where.inward * where.lost, half_length / speed
 
     def placement(tau: float) -> Any:
@@ -239,7 +239,7 @@ def _folds(
 
 
 def _instants(half_length: float, miss: float, duration: float) -> Array:
-    """Instants (2 SAMPLES + 1,) [s], dense about the nearest point as the speed is high there."""
+    """Space 201 instants [s] densely about the nearest point, where the speed is high."""
     if miss == 0:
         return np.linspace(0.0, duration, 2 * SAMPLES + 1)
     end = np.arcsinh(half_length / miss)
@@ -280,5 +280,5 @@ def _claims(
 
 
 def _distance_from(where: Singularity, q: Array, arm: Robot) -> float:
-    """Length (m, rad) of the twist from the singular placement to that of a configuration."""
+    """Compute the twist's length (m, rad) from the singular placement to that of q."""
     return float(np.linalg.norm(pin.log6(where.placement.actInv(placement_of(arm, q))).np))

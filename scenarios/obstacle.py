@@ -155,7 +155,7 @@ class ObstacleInTheWay(Family):
 
 
 def _swing(arm: Robot, middle: Array, swing: Swing, duration: float) -> tuple[Array, Reference]:
-    """The start (nq,) and the path of the task frame as the joint swings past the middle."""
+    """Compute the start (nq,) and the path of the task frame of a swing past the middle."""
     way = np.zeros(arm.nv)
     way[swing.joint] = swing.amplitude
 
@@ -176,7 +176,7 @@ def _swing(arm: Robot, middle: Array, swing: Swing, duration: float) -> tuple[Ar
 def _in_the_way(
     arm: Robot, q: Array, joint: int, where: Where, shape: Shape, depth: float
 ) -> CollisionConstraint:
-    """The obstacle that the motion runs into at q, `depth` inside, and the constraint about it."""
+    """Place the obstacle that the motion enters at q by `depth`, and constrain it."""
     kinematics = Kinematics(arm)
     kinematics.update(q)
     J = kinematics.spatial_jacobian
@@ -204,7 +204,7 @@ def _in_the_way(
 
 
 def _elbow_turn(arm: Robot, q: Array) -> tuple[Array, Array, Array]:
-    """The null space's direction (nv,) in which the elbow goes to the right, elbow, its velocity.
+    """Compute the null-space direction (nv,) of the elbow to the right, elbow, velocity.
 
     Elbow (3,) [m] and velocity (3,) in the world, whose x axis looks ahead.
     """
@@ -220,13 +220,13 @@ def _elbow_turn(arm: Robot, q: Array) -> tuple[Array, Array, Array]:
 
 
 def _velocity(twist: Array, point: Array) -> Array:
-    """Of a point (3,) that moves with a twist (linear; angular) given at the world's origin."""
+    """Compute the velocity (3,) of a point under a twist given at the world's origin."""
     velocity: Array = twist[:3] + np.cross(twist[3:], point)
     return velocity
 
 
 def _distance_of_hand(arm: Robot, q: Array, constraint: CollisionConstraint) -> float:
-    """The least distance [m] of what the task frame's joint carries, wherever the others are."""
+    """Compute the least distance [m] of what the task frame's joint carries."""
     kinematics, pairs = Kinematics(arm), constraint.pairs(arm)
     kinematics.update(q)
     joint = arm.model.frames[arm.frame_id].parentJoint
@@ -237,7 +237,7 @@ def _distance_of_hand(arm: Robot, q: Array, constraint: CollisionConstraint) -> 
 def _clear_motion(
     arm: Robot, reference: Reference, instants: Array, q0: Array, constraint: CollisionConstraint
 ) -> Array:
-    """Configurations (k + 1, nq) that follow the reference exactly and keep clear, where some do.
+    """Find configurations (k + 1, nq) that follow the reference and keep clear.
 
     The elbow turns away by as little as it takes, in steps of 0.1, and comes back: the way in the
     null space goes as sin^2(pi t/T).

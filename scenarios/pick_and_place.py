@@ -70,7 +70,7 @@ class PickAndPlace(Family):
         return Case(reference, q0, motion, claims)
 
     def _places(self, start: Any, rotation: Array) -> list[Any]:
-        """The placements between the legs, nine of them."""
+        """Compute the nine placements at the ends of the legs."""
         x, y, _ = start.translation
         across = rotation @ np.array([-y, x, 0.0])  # at a right angle to the arm
         across *= self.width / 2 / np.hypot(across[0], across[1])

@@ -152,7 +152,7 @@ class TaskConflict(Family):
 def _conflict(
     arm: Robot, q: Array, tracking: TrackingTask, second: PositionTask
 ) -> tuple[float, float, float]:
-    """At q: the last of rank J_2 singular values of J_2 N_1 and of J_2; the elbow's error.
+    """Compute sigma_min of J_2 N_1 and of J_2 at q, and the elbow's least error [m].
 
     That is the least one to which the arm gets from q while the hand stays where it is.
     """

@@ -91,24 +91,24 @@ class TorqueLimited(Family):
 
 
 def _gravity(arm: Robot, q: Array) -> Array:
-    """The torques that hold the arm at configurations q (k, nq), (k, nv) [N m]."""
+    """Compute the torques that hold the arm at configurations q (k, nq), (k, nv) [N m]."""
     return np.array([pin.computeGeneralizedGravity(arm.model, arm.scratch, x).copy() for x in q])
 
 
 def _torques(arm: Robot, motion: OracleMotion) -> Array:
-    """The torques of a joint motion at its inner samples, (k - 1, nv) [N m]."""
+    """Compute the torques of a joint motion at its inner samples, (k - 1, nv) [N m]."""
     period, v = float(motion.instants[1] - motion.instants[0]), motion.v
     return TorqueConstraint().torques(arm, motion.q[1:-1], v[1:], v[:-1], period)
 
 
 def _usage(arm: Robot, torques: Array) -> float:
-    """The largest torque over its limit."""
+    """Compute the largest torque over its limit."""
     assert arm.limits.effort is not None
     return float(arm.limits.effort.usage(torques).max())
 
 
 def _heaviest(arm: Robot, q: Array, load: float) -> float:
-    """The mass [kg] in the hand that takes `load` of a joint's limit to hold, at worst along q.
+    """Compute the payload [kg] whose holding torque peaks at `load` of a limit along q.
 
     Raises:
         DikbenchError: if the arm by itself takes as much.
@@ -123,7 +123,7 @@ def _heaviest(arm: Robot, q: Array, load: float) -> float:
 
 
 def _shortest(arm: Robot, rise: OracleMotion, demand: float) -> float:
-    """The time [s] in which the torques of a motion done in one second peak at `demand`.
+    """Compute the time [s] in which the torques of a one-second motion peak at `demand`.
 
     What is not gravity goes with 1/time^2.
     """
@@ -132,7 +132,7 @@ def _shortest(arm: Robot, rise: OracleMotion, demand: float) -> float:
 
 
 def _first_at(arm: Robot, share: float, torques: Array, slope: Array) -> float:
-    """The smallest x at which a joint of torques + x slope, (k, nv), is at `share` of its limit."""
+    """Compute the smallest x at which torques + x slope, (k, nv), reach `share` of a limit."""
     assert arm.limits.effort is not None
     limit = share * arm.limits.effort.upper
     with np.errstate(divide="ignore"):

@@ -100,7 +100,7 @@ class WorkspaceBoundary(Family):
 def _as_far_as_it_goes(
     arm: Robot, at: Callable[[float], Any], first: float, q0: Array
 ) -> OracleMotion:
-    """The motion along the placements at(distance) from `first` [m] on to the last one reached."""
+    """Follow the placements at(distance) from `first` [m] on until none is reached."""
     q, distance, stride = [q0], first, STRIDE
     while stride > RESOLUTION:
         try:
@@ -119,7 +119,7 @@ def _as_far_as_it_goes(
 def _out_and_back(
     at: Callable[[float], Any], direction: Array, first: float, way: float, speed: float
 ) -> Reference:
-    """From the distance `first` [m] along `direction` (in the frame's axes) by `way`, and back."""
+    """Build the line from the distance `first` [m] along `direction` by `way`, and back."""
     duration = pi * way / speed
     rate = pi / duration
 

@@ -98,7 +98,7 @@ STUDY_OPTIONS = (
 
 
 def study_options(command: Callable[..., None]) -> Callable[..., None]:
-    """The options that select a study, its axes and its results folder."""
+    """Add the options that select a study, its axes and its results folder."""
     for option in reversed(STUDY_OPTIONS):
         command = option(command)
     return command

@@ -80,5 +80,5 @@ def series_metrics(
 
 
 def unit_suffix(unit: str) -> str:
-    """How a unit is written at the end of a column's name: rad/s^2 is rad_s2, 1/s is per_s."""
+    """Write a unit as the end of a column's name: rad/s^2 is rad_s2, 1/s is per_s."""
     return unit.replace("1/", "per_").replace("/", "_").replace(" ", "_").replace("^", "")

@@ -76,7 +76,7 @@ def make_plant(text: str | Selector) -> Plant:
 
 
 def scenario_parameters(text: str | Selector) -> Mapping[str, Any]:
-    """The parameters of a scenario's selector with their values, defaults among them.
+    """Return the parameters of a scenario's selector with their values, defaults included.
 
     Raises:
         DikbenchError: on an unknown family or parameter, or a value of the wrong type or out of

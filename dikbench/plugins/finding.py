@@ -53,7 +53,7 @@ class Plugin:
         return self.paragraph("Source")
 
     def paragraph(self, title: str) -> str:
-        """The paragraph `title: ...` of its docstring, on one line; empty where there is none."""
+        """Return the paragraph `title: ...` of its docstring on one line, or an empty text."""
         _, _, text = (inspect.getdoc(self.factory) or "").partition(f"{title}: ")
         return " ".join(text.partition("\n\n")[0].split()).rstrip(".")
 
@@ -113,12 +113,12 @@ def scenario_plugin(name: str) -> Plugin:
 
 
 def in_file(name: str) -> bool:
-    """Whether a selector's name is `path/to/file.py:Class`."""
+    """Say whether a selector's name has the form `path/to/file.py:Class`."""
     return name.rpartition(":")[0].endswith(".py")
 
 
 def kind_in_file(name: str) -> Kind:
-    """Whether a class that is given as `path/to/file.py:Class` is a formulation or a family."""
+    """Say whether a class in a user's file is a formulation or a family."""
     path, _, class_name = name.rpartition(":")
     found = _class_from_file("formulation", path, class_name)
     return "scenario" if issubclass(found, Family) else "formulation"

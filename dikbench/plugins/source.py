@@ -18,7 +18,7 @@ The harness does not: it is in the version."""
 
 
 def source_digest(plugin: Plugin) -> str:
-    """A hash of the source of a plug-in, 16 hexadecimal digits.
+    """Hash the source of a plug-in to 16 hexadecimal digits.
 
     Of its own file and of the modules of its package that it imports, directly or through others:
     laws that share a module change with it, and no other law does.
@@ -37,7 +37,7 @@ def source_digest(plugin: Plugin) -> str:
 
 @lru_cache(maxsize=256)
 def digest_of_file(file: str) -> str:
-    """A hash of what a file holds; empty where there is none (a class made at a prompt)."""
+    """Hash a file's contents; empty where there is no file (a class made at a prompt)."""
     try:
         return digest(Path(file).read_bytes().decode(errors="replace"))
     except OSError:
@@ -45,13 +45,13 @@ def digest_of_file(file: str) -> str:
 
 
 def digest(text: str) -> str:
-    """A hash of a text, 16 hexadecimal digits."""
+    """Hash a text to 16 hexadecimal digits."""
     return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
 
 
 @lru_cache(maxsize=1024)
 def _imported(file: str, module: str, packages: frozenset[str]) -> frozenset[str]:
-    """The modules of some packages that a file imports, wherever in it, as the module `module`."""
+    """Find the modules of some packages that a file imports anywhere as module `module`."""
     try:
         tree = ast.parse(Path(file).read_bytes())
     except (OSError, SyntaxError, ValueError):  # no file, or none of Python's
@@ -72,7 +72,7 @@ def _imported(file: str, module: str, packages: frozenset[str]) -> frozenset[str
 
 
 def _base(node: ast.ImportFrom, file: str, module: str) -> str:
-    """The module from which an import takes names, without the dots of a relative one."""
+    """Return the absolute name of the module from which an import takes names."""
     if not node.level:
         return node.module or ""
     parts = module.split(".")
@@ -83,7 +83,7 @@ def _base(node: ast.ImportFrom, file: str, module: str) -> str:
 
 @lru_cache(maxsize=1024)
 def _file(module: str) -> str:
-    """The file of a module; empty where it has none or is none."""
+    """Return the file of a module; empty where it has none or is no module."""
     loaded = sys.modules.get(module)
     if loaded is not None:
         return getattr(loaded, "__file__", None) or ""

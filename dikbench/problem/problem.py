@@ -73,7 +73,7 @@ class DikProblem(msgspec.Struct, eq=False):
         return self.levels[0]
 
     def box(self, braking: Braking = "viable", position_gain: float = 0.5) -> Box:
-        """The velocity box (see `velocity_box`); how many bounds it gave up is recorded here."""
+        """Compute the velocity box (see `velocity_box`) and record how many bounds it gave up."""
         box = velocity_box(self.limits, self.v_prev, self.dt, braking, position_gain)
         self.relaxed = box.relaxed
         return box
@@ -103,7 +103,7 @@ class Formulation(Protocol):
     """
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
-        """The joint velocity of this control step, (nv,) [rad/s or m/s].
+        """Compute the joint velocity of this control step, (nv,) [rad/s or m/s].
 
         Raises:
             CannotAnswer: as `Infeasible` or `SolverFailed`; the harness applies the fallback.
@@ -112,11 +112,11 @@ class Formulation(Protocol):
 
 
 def program_of(formulation: Formulation) -> ProgramKind | None:
-    """What the formulation needs a solver for; None where it needs none."""
+    """Return the kind of program that the formulation has a solver solve, or None."""
     program: ProgramKind | None = getattr(formulation, "program", None)
     return program
 
 
 def promises_of(formulation: Formulation) -> frozenset[LimitKind]:
-    """The kinds of limits that the formulation promises to keep."""
+    """Return the kinds of limits that the formulation promises to keep."""
     return frozenset(getattr(formulation, "keeps", ()))

@@ -104,7 +104,7 @@ def velocity_box(
 def _without_acceleration(
     limits: Limits, dt: float, braking: Braking, position_gain: float
 ) -> tuple[Array, Array]:
-    """The bounds of position and velocity limits, (nv,) each."""
+    """Compute the bounds of position and velocity limits, (nv,) each."""
     joint = limits.joint
     gain = position_gain if braking == "gain" else 1.0
     to_lower, to_upper = limits.to_lower, limits.to_upper
@@ -159,7 +159,7 @@ class _Interior:
                 self.below = joint.position.upper - below
 
     def holds(self, coordinates: Array | None) -> bool:
-        """Whether these coordinates (nv,) are inside; for so few, a list is faster than `all`."""
+        """Say whether coordinates (nv,) are inside (for so few, lists are faster than `all`)."""
         if self.above is None or self.below is None or coordinates is None:
             return True
         return not (
@@ -170,7 +170,7 @@ class _Interior:
 
 @lru_cache(maxsize=256)
 def _interior(joint: JointLimits, dt: float, braking: Braking, gain: float) -> _Interior | None:
-    """The interior of these limits; None where it depends on the distance everywhere.
+    """Return the interior of these limits, or None where the distance matters everywhere.
 
     Raises:
         DikbenchError: on an unknown braking.
@@ -181,7 +181,7 @@ def _interior(joint: JointLimits, dt: float, braking: Braking, gain: float) -> _
 
 
 def _reach(speed: Array, deceleration: Array, dt: float, braking: Braking, gain: float) -> Array:
-    """Distance (nv,) [rad] from which a position limit allows this speed (nv,) [rad/s].
+    """Compute the distance (nv,) [rad] from which a position limit allows a speed (nv,) [rad/s].
 
     The inverse of the bounds, which grow with the distance, and a hair for rounding.
     """
@@ -209,7 +209,7 @@ BRAKES: Final[Mapping[str, Callable[[Array, Array, float], Array]]] = MappingPro
 def _ask_for_the_way_back(
     joint: JointLimits, to_lower: Array, to_upper: Array, upper: Array, lower: Array, dt: float
 ) -> None:
-    """Overwrite, in place, the bounds of the joints that are outside a position limit."""
+    """Overwrite the bounds of joints outside a position limit, in place."""
     above, below = to_upper < 0, to_lower < 0
     upper[above] = to_upper[above] / dt
     lower[below] = -to_lower[below] / dt
@@ -224,7 +224,7 @@ def _ask_for_the_way_back(
 
 
 def _with_acceleration(lower: Array, upper: Array, slowest: Array, fastest: Array) -> Box:
-    """Intersect with [slowest, fastest]; where that is empty, take the nearest velocity allowed."""
+    """Intersect with [slowest, fastest]; take the nearest allowed velocity where empty."""
     gap = np.maximum(slowest - upper, lower - fastest)
     relaxed = int(np.count_nonzero(gap > ROUNDING_SPEED_RAD_S))
     return Box(

@@ -23,12 +23,12 @@ NEEDED: Final = tuple(name for name in KEYS if name != "message")
 
 
 def are_exported(folder: Path) -> bool:
-    """Whether a folder holds exported trials: as CSV or, a fifth of it, as Parquet."""
+    """Say whether a folder holds exported trials, as CSV or as Parquet."""
     return (folder / TRIALS).is_file() or (folder / PARQUET).is_file()
 
 
 def read_trials(folder: Path, notes: list[str]) -> pd.DataFrame:
-    """The trials as the store had them; columns that were not known then lack.
+    """Read the trials as the store had them; columns unknown then are missing.
 
     Args:
         folder: the results folder.
@@ -49,7 +49,7 @@ def read_trials(folder: Path, notes: list[str]) -> pd.DataFrame:
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """The description of the run.
+    """Read the description of the run.
 
     Raises:
         DikbenchError: if it cannot be read.
@@ -76,7 +76,7 @@ def _parquet(file: Path) -> pd.DataFrame:
 
 
 def _rows(file: Path, notes: list[str]) -> pd.DataFrame:
-    """The rows of a CSV file as texts, without those that are cut off or have too many values."""
+    """Read the rows of a CSV file as texts, except those that are cut off or too long."""
     if not file.is_file():
         raise DikbenchError(
             f"no results in {file.parent}: neither results.sqlite nor {file.name} is there"
@@ -103,7 +103,7 @@ def _rows(file: Path, notes: list[str]) -> pd.DataFrame:
 
 
 def _numbers(texts: pd.Series) -> pd.Series:
-    """Integers where all are, else floats, empty ones missing, else what they were.
+    """Convert texts to integers where all are, else to floats, else leave them as they are.
 
     By Python's own reading: that of pandas errs in the last bit.
     """

@@ -34,7 +34,7 @@ class ResultsFolder:
         return self.path / "traces"
 
     def trace(self, trial: str) -> Path:
-        """The trace of a trial, by its id."""
+        """Return the file of a trial's trace, by the trial's id."""
         return self.traces / f"{trial}.arrow"
 
     @property
@@ -78,7 +78,7 @@ class ResultsFolder:
             raise DikbenchError(f"no results in {self.path}: {self.database.name} is missing")
 
     def open_store(self, *, add_metrics: bool = False) -> Store:
-        """The store that is there already.
+        """Open the store, which must exist.
 
         Args:
             add_metrics: see `Store`.

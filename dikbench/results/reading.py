@@ -232,7 +232,7 @@ def _manifest(folder: Path, notes: list[str]) -> dict[str, Any]:
 
 
 def _described(trials: pd.DataFrame) -> pd.DataFrame:
-    """Note units and definitions of the columns; empty where this version knows none."""
+    """Attach units and definitions of the columns; empty where unknown to this version."""
     known = {
         **DESCRIBED,
         **{metric.name: (metric.unit, metric.definition) for metric in METRICS.values()},

@@ -100,7 +100,7 @@ class Store:
         self._environments = {row[0] for row in self._rows("SELECT id FROM environments")}
 
     def __enter__(self) -> Self:
-        """Use the store."""
+        """Return the store."""
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -108,7 +108,7 @@ class Store:
         self._database.close()
 
     def begin_run(self, manifest: Mapping[str, Any], planned: Sequence[PlannedTrial]) -> int:
-        """Note that a run begins; its plan says in which order rows are shown.
+        """Record the beginning of a run; its plan says in which order rows are shown.
 
         Returns:
             The number of the run.
@@ -135,11 +135,11 @@ class Store:
         self._database.executemany("UPDATE trials SET superseded = 1 WHERE id = ?", old)
 
     def statuses(self) -> dict[str, str]:
-        """The status of every trial that has a row, by id."""
+        """Return the status of every trial that has a row, by id."""
         return dict(self._rows("SELECT id, status FROM trials"))
 
     def stored_trials(self) -> list[StoredTrial]:
-        """Every trial that is shown."""
+        """List every trial that is shown."""
         rows = self._rows(f"SELECT id, steps, {', '.join(TRIAL)} FROM trials WHERE NOT superseded")
         return [
             StoredTrial(name, Trial.of(**dict(zip(TRIAL, cell, strict=True))), steps)
@@ -147,7 +147,7 @@ class Store:
         ]
 
     def timed(self) -> set[str]:
-        """The ids of the cells that have times."""
+        """Return the ids of the cells that have times."""
         return {row[0] for row in self._rows("SELECT id FROM times")}
 
     def environment(self, description: Mapping[str, Any]) -> str:
@@ -164,7 +164,7 @@ class Store:
         return name
 
     def record_trial(self, row: Mapping[str, Any], run: int, position: int) -> None:
-        """Commit the row of a finished trial; an earlier one of the same trial is replaced."""
+        """Commit the row of a finished trial, replacing an earlier one."""
         columns = ("id", *KEYS, "steps", *NUMBERS, "environment")
         values = {name: row.get(name) for name in columns}
         self._insert("trials", {**values, "run": run, "position": position})
@@ -184,7 +184,7 @@ class Store:
         self._insert("times", {**{name: row.get(name) for name in columns}, "run": run})
 
     def trials(self) -> pd.DataFrame:
-        """Every trial, those of the last run's plan first and in its order; with their times."""
+        """Return every trial with its times, those of the last plan first and in its order."""
         order = ", ".join(["id", *KEYS, "steps", *NUMBERS, "environment", "run"])
         trials = self._frame(
             f"SELECT {order} FROM trials WHERE NOT superseded "
@@ -194,13 +194,13 @@ class Store:
         return trials.merge(self.times(), on=TIMED, how="left")
 
     def times(self) -> pd.DataFrame:
-        """The times of every cell."""
+        """Return the times of every cell."""
         numbers = [name for name, (kind, _) in TIMES.items() if kind == "REAL"]
         columns = ", ".join([*TIMED, *TIMES])
         return self._frame(f"SELECT {columns} FROM times ORDER BY {', '.join(TIMED)}", numbers)
 
     def manifest(self) -> dict[str, Any]:
-        """The description of the last run.
+        """Return the description of the last run.
 
         Raises:
             DikbenchError: if there was none.
@@ -220,7 +220,7 @@ class Store:
             )
 
     def environments(self) -> list[dict[str, Any]]:
-        """The descriptions of the processes that made the rows of trials that are shown."""
+        """Return the descriptions of the processes that made the rows that are shown."""
         rows = self._rows(
             "SELECT description FROM environments WHERE id IN "
             "(SELECT environment FROM trials WHERE NOT superseded)"
@@ -310,7 +310,7 @@ class Store:
             self._database.execute("UPDATE meta SET value = ? WHERE key = 'schema'", [str(SCHEMA)])
 
     def _check_untouched(self) -> None:
-        """A file that is removed or cut under an open database takes rows without a word."""
+        """Check that the file is still there: SQLite would write to a removed one in silence."""
         try:
             now = self.path.stat()
         except OSError:

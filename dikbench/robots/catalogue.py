@@ -305,7 +305,7 @@ def _load_urdf(path: str, frame: str | None) -> Robot:
 
 
 def _well_conditioned_start(model: Any, frame: str) -> Array:
-    """The posture with the largest smallest singular value among a few dozen inside the limits."""
+    """Choose the posture with the largest smallest singular value among 64 seeded ones."""
     data, index = model.createData(), frame_id(model, frame)
     limits = model_limits(model)
     assert limits.position is not None

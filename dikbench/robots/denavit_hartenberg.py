@@ -53,6 +53,6 @@ def denavit_hartenberg_arm(
 
 
 def _rotation_about_x(angle: float) -> Array:
-    """Rotation with exact zeros and ones at quarter turns."""
+    """Build a rotation (3, 3) with exact zeros and ones at quarter turns."""
     c, s = np.round(np.cos(angle), 15), np.round(np.sin(angle), 15)
     return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])

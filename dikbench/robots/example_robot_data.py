@@ -71,12 +71,12 @@ def urdf_visuals(model: Any, file: str, packages: Path) -> Any:
 
 
 def joints(pattern: str, first: int, last: int) -> tuple[str, ...]:
-    """Names with consecutive numbers in the place of the braces of a pattern."""
+    """Number names consecutively in the place of the braces of a pattern."""
     return tuple(pattern.format(number) for number in range(first, last + 1))
 
 
 def data_file(path: str) -> str:
-    """Where a file of the package's folder `robots` is installed."""
+    """Return where a file of the package's folder `robots` is installed."""
     return str(_data_folder() / path)
 
 

@@ -35,11 +35,11 @@ class Kinematics:
         pin.computeJointJacobians(self._model, self._data, q)
 
     def placement(self, frame: int) -> Any:
-        """Placement of a frame in the world, as a view into the data: copy it to keep it."""
+        """Compute the placement of a frame in the world, as a view: copy it to keep it."""
         return pin.updateFramePlacement(self._model, self._data, frame)
 
     def jacobian(self, frame: int) -> Array:
-        """Body Jacobian of a frame, (6, nv), rows (linear; angular) in the frame's own axes."""
+        """Compute the body Jacobian of a frame, (6, nv), rows (linear; angular) in its own axes."""
         J: Array = pin.getFrameJacobian(self._model, self._data, frame, LOCAL)
         return J if J.ndim == 2 else J[:, None]  # of a single joint Pinocchio makes a vector
 
@@ -58,7 +58,7 @@ class Kinematics:
         pin.updateGeometryPlacements(self._model, self._data, geometry, placed)
 
     def centre_of_mass(self) -> tuple[Array, Array]:
-        """Centre of mass (3,) [m] and its Jacobian (3, nv), in the axes of the world.
+        """Compute the centre of mass (3,) [m] and its Jacobian (3, nv), in the world's axes.
 
         Not finite if the model has no mass.
         """
@@ -68,5 +68,5 @@ class Kinematics:
 
 
 def smallest_singular_value(J: Array) -> float:
-    """The smallest of the min(m, n) singular values of a task Jacobian (m, n)."""
+    """Compute the smallest of the min(m, n) singular values of a task Jacobian (m, n)."""
     return float(np.linalg.svd(J, compute_uv=False)[-1])

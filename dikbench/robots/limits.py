@@ -31,7 +31,7 @@ class Interval:
             object.__setattr__(self, side, bound)
 
     def usage(self, values: Array) -> Array:
-        """Values (..., nv) over the bound on their own side; infinite past a bound of zero."""
+        """Divide values (..., nv) by the bound on their side; infinite past a bound of zero."""
         bound = np.abs(np.where(values > 0, self.upper, self.lower))
         with np.errstate(divide="ignore"):
             share: Array = np.divide(
@@ -141,7 +141,7 @@ class JointLimits:
         return middle
 
     def at(self, q: Array) -> Limits:
-        """The limits as seen from configuration q (nq,)."""
+        """Return the limits as seen from configuration q (nq,)."""
         if self.position is None:
             return Limits(self, None)
         return Limits(self, q if self._coordinates_are_q else q[self.q_index])

@@ -11,7 +11,7 @@ from dikbench.robots.robot import Robot
 
 
 def with_payload(robot: Robot, mass: float, radius: float = 0.05) -> Robot:
-    """The same robot with a solid ball in its hand, centred on the task frame.
+    """Return the same robot with a solid ball in its hand, centred on the task frame.
 
     The ball's inertia is added to the body that carries the frame; the kinematics stay as they are.
 

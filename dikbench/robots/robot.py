@@ -55,7 +55,7 @@ class Robot:
 
     @cached_property
     def frame_id(self) -> int:
-        """Pinocchio's index of the task frame."""
+        """Return Pinocchio's index of a frame of a model."""
         return frame_id(self.model, self.frame)
 
     @cached_property
@@ -94,7 +94,7 @@ class Robot:
         return np.array([index for indices in moved for index in indices], dtype=np.intp)
 
     def reach_of(self, placement: Any) -> float:
-        """Distance [m] of a placement (`pinocchio.SE3`) from the origin of the first joint."""
+        """Compute the distance [m] of a placement (`pinocchio.SE3`) from the first joint."""
         first = self.model.jointPlacements[1].translation
         return float(np.linalg.norm(placement.translation - first))
 
@@ -106,7 +106,7 @@ class Robot:
         acceleration: object = UNCHANGED,
         effort: object = UNCHANGED,
     ) -> Robot:
-        """The same robot with other limits in force.
+        """Return the same robot with other limits in force.
 
         Args:
             position: None (not in force) or a pair (lower, upper) [rad or m].
@@ -139,7 +139,7 @@ class Robot:
 
 
 def frame_id(model: Any, frame: str) -> int:
-    """Index of a frame of a model.
+    """Return Pinocchio's index of a frame of a model.
 
     Raises:
         DikbenchError: if the model has no frame of this name.
@@ -151,7 +151,7 @@ def frame_id(model: Any, frame: str) -> int:
 
 
 def checked_vector(value: object, size: int, what: str) -> Array:
-    """A finite vector of the given size, copied.
+    """Return a copy of a finite vector of the given size.
 
     Raises:
         DikbenchError: if it is anything else.

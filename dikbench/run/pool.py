@@ -29,7 +29,7 @@ THREAD_VARIABLES: Final = (
 def workers(
     count: int, imports: tuple[str, ...] = (), memory: int | None = None
 ) -> Iterator[ProcessPool]:
-    """A pool of persistent processes, each with one thread, set before it imports anything.
+    """Start persistent worker processes, each limited to one thread before it imports anything.
 
     Args:
         count: number of processes.
@@ -65,7 +65,7 @@ def workers(
 
 
 def available_cores() -> int:
-    """Number of cores that this process may use."""
+    """Return the number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

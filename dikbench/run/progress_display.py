@@ -28,11 +28,11 @@ class ProgressDisplay:
         )
 
     def __enter__(self) -> Self:
-        """Start."""
+        """Return the display."""
         return self
 
     def advance(self) -> None:
-        """One more is finished."""
+        """Count one more finished piece of work."""
         self._done += 1
         if self._bar is not None:
             self._bar.update()
@@ -51,6 +51,6 @@ class ProgressDisplay:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """End."""
+        """Close the bar."""
         if self._bar is not None:
             self._bar.close()

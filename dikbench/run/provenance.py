@@ -63,7 +63,7 @@ def manifest(study: Study, trials: int, description: dict[str, Any]) -> dict[str
 
 
 def git_commit() -> str | None:
-    """The commit of the checkout that dikbench runs from, "+" where it has changes; else None."""
+    """Return the commit of the checkout in use, with "+" where it has changes; else None."""
     try:
         # A wheel inside somebody's checkout is not a part of it.
         _git("ls-files", "--error-unmatch", Path(__file__).name)

@@ -42,7 +42,7 @@ class Recomputed:
     failed: dict[str, str]
 
     def __str__(self) -> str:
-        """One line."""
+        """Summarise in one line."""
         kept = {
             "without a trace": self.without_trace,
             "whose formulation or scenario has changed since": self.changed,
@@ -92,7 +92,7 @@ def recompute_results(out: Path, jobs: int, command: str) -> Recomputed:
 
 
 def _is_the_same(stored: StoredTrial) -> bool:
-    """Whether a trial would be this one if it were run today."""
+    """Say whether a trial would have the same id if it were run today."""
     try:
         return trial_id(stored.trial) == stored.id
     except DikbenchError:  # the formulation's file is gone, the scenario has another parameter
@@ -129,7 +129,7 @@ def _recompute(
 
 
 def metrics_of(stored: StoredTrial, file: Path) -> dict[str, float]:
-    """In a worker process: the metrics of a trial from its trace.
+    """Compute the metrics of a trial from its trace, in a worker process.
 
     Raises:
         DikbenchError: if the trace cannot be read, or is not one of this trial.

@@ -140,13 +140,13 @@ def _check_rerun(rerun: str, planned: Sequence[PlannedTrial]) -> None:
 
 
 def _names(trial: Trial) -> set[str]:
-    """What a trial can be called by: selectors, and names without parameters."""
+    """Return the texts that name a trial: its selectors, and their names alone."""
     selectors = (trial.formulation, trial.scenario, trial.solver)
     return {*map(str, selectors), *(selector.name for selector in selectors)}
 
 
 def _again(planned: PlannedTrial, status: str, rerun: str) -> bool:
-    """Whether a finished trial is to be run again."""
+    """Say whether a finished trial is to be run again."""
     if rerun == "failed":
         return status not in {Status.OK.value, Status.SKIPPED.value}
     return rerun == "all" or rerun in _names(planned.trial)
@@ -214,7 +214,7 @@ def run_trials(
 
 
 def _row(future: Future[Any], trial: Trial, timeout: float) -> TrialRow:
-    """The row of a finished trial, whatever became of it."""
+    """Return the row of a finished trial, however it ended."""
     try:
         row, described = future.result()
     except CannotStore:
@@ -235,7 +235,7 @@ def _row(future: Future[Any], trial: Trial, timeout: float) -> TrialRow:
 def _time(
     store: Store, run: int, study: Study, planned: Sequence[PlannedTrial], *, again: bool
 ) -> None:
-    """The timing pass, in one process of its own when no trial runs."""
+    """Run the timing pass in one process of its own while no trial runs."""
     done, timing = store.statuses(), study.timing
     # A law that took its process with it in a trial would do so again, and the others' times too.
     fatal = {(p.trial.formulation, p.trial.solver) for p in planned if done.get(p.id) in FATAL}
@@ -285,7 +285,7 @@ def _time(
 
 
 def status_of(out: Path) -> dict[str, int]:
-    """How many trials of the last study are done, by status, and how many are missing.
+    """Count the trials of the last study by status, and those that are missing.
 
     Raises:
         DikbenchError: if the folder holds no results.

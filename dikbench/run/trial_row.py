@@ -38,7 +38,7 @@ class CannotStore(DikbenchError):
 
 @lru_cache(maxsize=32)
 def scenario_of(selector: Selector, seed: int) -> Scenario:
-    """The scenario of a trial, built once per process."""
+    """Return the scenario of a trial, built once per process."""
     return make_scenario(selector, seed)
 
 
@@ -50,7 +50,7 @@ def solve_of(formulation: Selector, solver: Selector, *, checks: bool = True) ->
 
 
 def row_without_run(trial: Trial, status: Status, message: str) -> TrialRow:
-    """The row of a trial of which nothing can be measured."""
+    """Make the row of a trial of which nothing can be measured."""
     return {**trial.row, "status": status.value, "message": message, "steps": 0}
 
 

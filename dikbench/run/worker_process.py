@@ -69,13 +69,13 @@ def calm_down() -> None:
 
 
 def _die_with_the_driver() -> None:
-    """A formulation that loops for ever must not outlive a driver that was killed (Linux)."""
+    """Have Linux kill this process when the driver dies: a formulation may loop for ever."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PARENT_DEATH_SIGNAL, signal.SIGKILL)
 
 
 def _silence() -> None:
-    """What a plug-in or a solver prints goes nowhere: megabytes would drown the run."""
+    """Discard what plug-ins and solvers print: megabytes would drown the run."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     for stream in (1, 2):
         os.dup2(nowhere, stream)
@@ -83,7 +83,7 @@ def _silence() -> None:
 
 
 def _address_space() -> int:
-    """Bytes of address space that this process has now."""
+    """Return the bytes of address space that this process has now."""
     try:
         with open("/proc/self/statm") as file:
             return int(file.read().split()[0]) * resource.getpagesize()

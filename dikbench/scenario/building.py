@@ -32,7 +32,7 @@ enough not to be seen in the pose."""
 
 
 def limits_in_force(robot: Robot, *, acceleration: bool) -> Robot:
-    """The robot with its acceleration limits in force, or without.
+    """Return the robot with its acceleration limits in force, or without.
 
     Raises:
         DikbenchError: if they are wanted and none are known for this robot.
@@ -45,7 +45,7 @@ def limits_in_force(robot: Robot, *, acceleration: bool) -> Robot:
 
 
 def influence_distance(*, acceleration: bool) -> float:
-    """Distance [m] from which a collision is looked out for: farther where joints brake slowly."""
+    """Return the distance [m] below which a collision pair has a row."""
     return 0.5 if acceleration else 0.1
 
 
@@ -61,7 +61,7 @@ def secondary_tasks(
 def start_velocity(
     robot: Robot, reference: Reference, q0: Array, tracking: TrackingTask = POSE
 ) -> Array:
-    """The joint velocity (nv,) that follows the reference at its beginning, inside the limits."""
+    """Compute the joint velocity (nv,) at the reference's beginning, scaled into the limits."""
     kinematics = Kinematics(robot)
     kinematics.update(q0)
     twist = pin.Motion(reference.velocity(0.0))
@@ -76,14 +76,14 @@ def start_velocity(
 
 
 def placement_of(robot: Robot, q: Array) -> pin.SE3:
-    """Placement of the task frame at a configuration (nq,)."""
+    """Compute the placement of the task frame at a configuration (nq,)."""
     kinematics = Kinematics(robot)
     kinematics.update(q)
     return kinematics.placement(robot.frame_id).copy()
 
 
 def duration_at(robot: Robot, at_one_second: Reference, q0: Array, speed: float) -> float:
-    """How long a motion takes [s] whose exact joint motion peaks at `speed` times the limits.
+    """Compute the duration [s] for which the exact joint motion peaks at `speed` over limits.
 
     Args:
         robot: the robot, with velocity limits in force.
@@ -96,7 +96,7 @@ def duration_at(robot: Robot, at_one_second: Reference, q0: Array, speed: float)
 
 
 def least_norm_share(robot: Robot, q: Array, joint: int, tracking: TrackingTask = POSE) -> float:
-    """The smallest share of a joint in the least-norm velocity that does what it does alone.
+    """Compute the smallest share of a joint in the least-norm velocity for its own effect.
 
     The entry (joint, joint) of J^+ J, at configurations q (k, nq): 1 where no other velocity does
     it, less where the arm's null space has a part of it.
@@ -110,7 +110,7 @@ def least_norm_share(robot: Robot, q: Array, joint: int, tracking: TrackingTask 
 
 
 def samples(duration: float, dt: float, most: int = 200) -> Array:
-    """Instants (k + 1,) [s] from end to end at which a certificate is measured.
+    """Return the instants (k + 1,) [s] from end to end at which a certificate is measured.
 
     Every control step, or `most` of them where there are more.
     """
@@ -144,7 +144,7 @@ def usual_claims(
 
 
 def there_and_back(robot: Robot, start: Array, way: Array, duration: float) -> JointMotion:
-    """The joint motion q(t) = start + sin^2(pi t/T) way, with its derivative.
+    """Build the joint motion q(t) = start + sin^2(pi t/T) way, with its derivative.
 
     Args:
         robot: the robot.
@@ -165,7 +165,7 @@ def there_and_back(robot: Robot, start: Array, way: Array, duration: float) -> J
 
 
 def at_constant_rate(robot: Robot, start: Array, rate: Array) -> JointMotion:
-    """The joint motion q(t) = start + t rate, with its derivative.
+    """Build the joint motion q(t) = start + t rate, with its derivative.
 
     Args:
         robot: the robot.

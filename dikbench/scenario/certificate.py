@@ -28,7 +28,7 @@ class Claim:
         return self.at_least <= self.value <= self.at_most
 
     def __str__(self) -> str:
-        """The claim in words."""
+        """Write the claim as an inequality."""
         low = f"{self.at_least:.4g} <= " if self.at_least > -float("inf") else ""
         high = f" <= {self.at_most:.4g}" if self.at_most < float("inf") else ""
         return f"{low}{self.quantity} = {self.value:.4g}{high}"

@@ -154,5 +154,5 @@ class Family(Parameters, ABC):
 
 
 def certified_robots(family: type[Family]) -> tuple[str, ...]:
-    """Robots on which a family's defaults are certified: those of its type, else its `robots`."""
+    """Return the robots on which a family's defaults are certified."""
     return parameters_of(family)["robot"].choices or family.robots

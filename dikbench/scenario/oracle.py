@@ -60,7 +60,7 @@ def solve_placement(
     tracking: TrackingTask = POSE,
     iterations: int = 200,
 ) -> Array:
-    """A configuration that does a tracking task, by damped Gauss-Newton from `seed`.
+    """Find a configuration that does a tracking task, by damped Gauss-Newton from `seed`.
 
     Steps are Levenberg-Marquardt with damping by the squared error (Sugihara 2011), at most 0.3 rad
     each; position limits are not looked at.
@@ -98,7 +98,7 @@ def solve_placement(
 def follow(
     robot: Robot, reference: Reference, q0: Array, instants: Array, tracking: TrackingTask = POSE
 ) -> Array:
-    """Configurations (k + 1, nq) that follow a reference exactly from q0 on.
+    """Compute configurations (k + 1, nq) that follow a reference exactly from q0 on.
 
     Each is solved from the one before it, in the least-norm way where the arm has a null space.
 
@@ -165,7 +165,7 @@ def measure_motion(
 
 
 def position_margin(robot: Robot, q: Array) -> float:
-    """Smallest distance [rad] of a configuration (nq,) to a position limit, negative outside.
+    """Compute the smallest distance [rad] of q (nq,) to a position limit, negative outside.
 
     Of the joints that move the task frame.
     """

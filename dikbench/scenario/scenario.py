@@ -89,7 +89,7 @@ class Scenario:
         return [self.target(k * self.dt) for k in range(self.steps + 1)]
 
     def target(self, tau: float) -> tuple[Any, Any]:
-        """Placement and body twist of the reference at a nominal time [s]."""
+        """Compute placement and body twist of the reference at a nominal time [s]."""
         return self.reference.placement(tau), pin.Motion(self.reference.velocity(tau))
 
     @cached_property

@@ -65,7 +65,7 @@ class Singularity:
     growth: Array
 
     def oriented_like(self, other: Singularity) -> Singularity:
-        """The same, `lost` and `bend` with the signs that a posture nearby has.
+        """Return the same singularity, `lost` and `bend` with the signs of a nearby posture.
 
         The signs of singular vectors mean nothing, and may change from one posture to the next.
         """
@@ -77,7 +77,7 @@ class Singularity:
 
 
 def analyse(robot: Robot, q: Array) -> Singularity:
-    """What kind of singularity an exactly singular posture (nq,) is.
+    """Determine what kind of singularity an exactly singular posture (nq,) is.
 
     Raises:
         DikbenchError: if the posture is not singular, or loses more than one direction.
@@ -123,7 +123,7 @@ def analyse(robot: Robot, q: Array) -> Singularity:
 
 
 def make_singular(robot: Robot, seed: Array, *, fixed: tuple[int, ...] = ()) -> Array:
-    """The exactly singular posture (nq,) next to a seed (nq,), by Gauss-Newton.
+    """Find the exactly singular posture (nq,) next to a seed (nq,), by Gauss-Newton.
 
     Solves J(q)^T u = 0, ||u|| = 1 for the posture and its lost twist u together, from u_m of the
     seed on, in least-norm steps of at most 0.2 rad.
@@ -163,7 +163,7 @@ def make_singular(robot: Robot, seed: Array, *, fixed: tuple[int, ...] = ()) -> 
 
 
 def singular_postures(robot: Robot, margin: float, attempts: int = 24) -> Iterator[Array]:
-    """Singular postures (nq,) inside the position limits, from the robot's start outwards.
+    """Yield singular postures (nq,) inside the position limits, near the robot's start first.
 
     Args:
         robot: the robot.
@@ -183,7 +183,7 @@ def singular_postures(robot: Robot, margin: float, attempts: int = 24) -> Iterat
 
 
 def _jacobian_derivatives(robot: Robot, q: Array) -> Array:
-    """dJ/dq_k of the rows that the arm can move, by central differences, (nv, m, nv)."""
+    """Compute dJ/dq_k of the rows that the arm can move, by central differences, (nv, m, nv)."""
     rows, nv = np.array(robot.task_rows), robot.nv
     kinematics, unit = Kinematics(robot), np.eye(nv)
     derivatives = np.empty((nv, len(rows), nv))

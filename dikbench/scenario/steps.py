@@ -11,7 +11,7 @@ MOST_STEPS: Final = 100_000
 
 
 def steps_in(duration: float, dt: float) -> int:
-    """Number of control steps of dt [s] in a duration [s], at least one.
+    """Compute the number of control steps of dt [s] in a duration [s], at least one.
 
     Raises:
         DikbenchError: if there are too many, or the duration is shorter than half a step.

@@ -30,7 +30,7 @@ class Variation:
     timing: float = 0.0
 
     def drawn(self, seed: int) -> Perturbation:
-        """What this seed changes.
+        """Draw what this seed changes.
 
         Raises:
             DikbenchError: on a negative seed.
@@ -40,7 +40,7 @@ class Variation:
         return Perturbation(self, seed)
 
     def __str__(self) -> str:
-        """The ranges in words."""
+        """Write the ranges in words."""
         parts = [
             f"start by up to {self.start:.3g} rad per joint" if self.start else "",
             f"direction by up to {self.direction:.3g} rad" if self.direction else "",
@@ -66,7 +66,7 @@ class Perturbation:
     seed: int
 
     def posture(self, robot: Robot, q: Array, fixed: tuple[int, ...] = ()) -> Array:
-        """A configuration (nq,) with its joints moved, but those (indices into v) in `fixed`."""
+        """Move the joints of a configuration (nq,), except those (indices into v) in `fixed`."""
         if self.seed == 0 or self.ranges.start == 0:
             return q
         step = self._random(0).uniform(-self.ranges.start, self.ranges.start, robot.nv)
@@ -75,7 +75,7 @@ class Perturbation:
         return moved
 
     def rotation(self, robot: Robot) -> Array:
-        """A rotation (3, 3) by which directions are turned; a planar arm keeps to its plane."""
+        """Draw a rotation (3, 3) of directions; a planar arm keeps to its plane."""
         if self.seed == 0 or self.ranges.direction == 0:
             return np.eye(3)
         random = self._random(1)

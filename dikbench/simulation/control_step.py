@@ -107,7 +107,7 @@ def fallback(problem: DikProblem) -> Array:
 
 
 def _slowest(problem: DikProblem, v_prev: Array) -> float:
-    """The smallest factor c (see `fallback`)."""
+    """Compute the smallest factor c (see `fallback`)."""
     factors = [0.0]
     acceleration = problem.limits.joint.acceleration
     if acceleration is not None:

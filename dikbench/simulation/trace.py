@@ -54,7 +54,7 @@ class Trace:
         return len(self.applied)
 
     def share(self, status: Status) -> float:
-        """Share of the steps with this status; NaN if there was none."""
+        """Compute the share of the steps with this status; NaN without steps."""
         if not self.steps:
             return float("nan")
         return float(np.mean(self.status == STEP_CODE[status]))
@@ -99,7 +99,7 @@ _COLUMNS = tuple(field.name for field in fields(Trace) if field.name != "dt")
 
 
 def _column(values: Array | Indices, rows: int) -> Any:
-    """An array (k, ...) as a column of at least k rows; what is missing is 0."""
+    """Turn an array (k, ...) into a column of at least k rows; missing rows are 0."""
     if len(values) < rows:
         filled = np.zeros((rows, *values.shape[1:]), dtype=values.dtype)
         filled[: len(values)] = values
@@ -109,7 +109,7 @@ def _column(values: Array | Indices, rows: int) -> Any:
 
 
 def _array(column: Any) -> Any:
-    """The column of a table as an array."""
+    """Turn the column of a table into an array."""
     whole = column.combine_chunks()
     if not pa.types.is_fixed_size_list(whole.type):
         return whole.to_numpy()

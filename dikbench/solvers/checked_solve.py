@@ -103,7 +103,7 @@ class CheckedSolve:
         raise error
 
     def _reason(self, program: QuadraticProgram | ModelledProgram) -> Infeasible | SolverFailed:
-        """Why there is no answer; the timing pass does not ask."""
+        """Decide why there is no answer; the timing pass does not ask."""
         matrices = program.matrices() if isinstance(program, ModelledProgram) else program
         if not self._checks or is_feasible(matrices):
             return SolverFailed("the solver gave no answer to a feasible program")

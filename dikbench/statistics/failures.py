@@ -27,23 +27,23 @@ SKIPPED = Status.SKIPPED.value
 
 
 def ran(trials: pd.DataFrame) -> pd.DataFrame:
-    """The rows of trials that were not skipped."""
+    """Return the rows of trials that were not skipped."""
     rows: pd.DataFrame = trials[trials["status"] != SKIPPED]
     return rows
 
 
 def has_failed(trials: pd.DataFrame) -> Mask:
-    """Whether each trial failed: neither ran to its end nor was skipped."""
+    """Say whether each trial failed: neither ran to its end nor was skipped."""
     failed: Mask = ~trials["status"].isin([Status.OK.value, SKIPPED]).to_numpy()
     return failed
 
 
 def worst_value(metric: str) -> float:
-    """What a failed trial takes of a metric; infinity for what is none of ours (a time)."""
+    """Return what a failed trial counts for in a metric; infinity for a column of times."""
     return METRICS[metric].worst if metric in METRICS else np.inf
 
 
 def failures_at_worst(trials: pd.DataFrame, metric: str) -> Array:
-    """A metric of each trial, with failed trials at its worst value, which may be infinite."""
+    """Return a metric of each trial, failed ones at its worst value, which may be infinite."""
     recorded = trials[metric].to_numpy(dtype=float)
     return np.where(has_failed(trials), worst_value(metric), recorded)

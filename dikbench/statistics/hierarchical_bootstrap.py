@@ -31,7 +31,7 @@ def draw_weights(
     resamples: int = RESAMPLES,
     seed: int = SEED,
 ) -> Array:
-    """How often each trial is drawn in each resample, (resamples, n).
+    """Count how often each trial is drawn in each resample, (resamples, n).
 
     Args:
         families: the family of each of n trials.
@@ -56,7 +56,7 @@ def draw_weights(
 
 
 def mean_intervals(values: Array, weights: Array) -> Array:
-    """95 % percentile intervals of the means of columns, (k, 2).
+    """Compute the 95 % percentile intervals of the means of columns, (k, 2).
 
     NaN where all values are equal, or there is one: what was not seen cannot be resampled (no
     failure in ten trials is no proof of none).
@@ -78,11 +78,11 @@ def mean_intervals(values: Array, weights: Array) -> Array:
 
 
 def _largest(values: Array) -> Array:
-    """The largest number of each column, NaN where there is none."""
+    """Return the largest number of each column, NaN where there is none."""
     largest: Array = np.fmax.reduce(values, axis=0, initial=np.nan)
     return largest
 
 
 def _equal_multinomial(random: np.random.Generator, draws: Indices, boxes: int) -> Indices:
-    """Counts of `draws` (k,) balls in equally likely boxes, (k, boxes)."""
+    """Draw the counts of `draws` (k,) balls in equally likely boxes, (k, boxes)."""
     return random.multinomial(draws, np.full(boxes, 1 / boxes))

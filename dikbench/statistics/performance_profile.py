@@ -20,7 +20,7 @@ from dikbench.arrays import Array
 
 
 def performance_ratios(costs: Array) -> Array:
-    """r_ps, (problems, formulations), infinite where a formulation did not solve a problem.
+    """Compute r_ps, (problems, formulations), infinite where a problem was not solved.
 
     Problems that no formulation solved stay, with infinite ratios: every profile ends below 1 by
         them.
@@ -37,7 +37,7 @@ def performance_ratios(costs: Array) -> Array:
 
 
 def profile(ratios: Array, factors: Array) -> Array:
-    """rho_s at each factor tau, (factors, formulations); NaN where there are no problems.
+    """Compute rho_s at each factor tau, (factors, formulations); NaN where there are no problems.
 
     Args:
         ratios: (problems, formulations), of `performance_ratios`.
@@ -51,7 +51,7 @@ def profile(ratios: Array, factors: Array) -> Array:
 
 
 def area(ratios: Array, largest: float) -> Array:
-    """The mean height of each profile over 1 <= tau <= largest on a logarithmic axis, (laws,).
+    """Compute each profile's mean height over 1 <= tau <= largest, log axis, (formulations,).
 
     Args:
         ratios: (problems, formulations), of `performance_ratios`; at least one problem.

@@ -18,7 +18,7 @@ from dikbench.study.trial import NO_SOLVER, Trial
 
 
 def trial_id(trial: Trial) -> str:
-    """The id of a trial, 16 hexadecimal digits.
+    """Return the id of a trial, 16 hexadecimal digits.
 
     Made of the formulation and its parameters, the scenario family and its parameters, both with
     the version of their source (see `source_digest`); the solver, how it is called and its
@@ -54,7 +54,7 @@ def _formulation(selector: Selector) -> str:
 
 @lru_cache(maxsize=65536)
 def scenario_id(selector: Selector) -> str:
-    """The id of a scenario: its family, parameters and the version of its source, not its seed."""
+    """Return the id of a scenario: family, parameters and source version, without the seed."""
     values = {key: _described(value) for key, value in scenario_parameters(selector).items()}
     plugin = scenario_plugin(selector.name)
     return digest(json.dumps([selector.name, values, source_digest(plugin)], sort_keys=True))
@@ -72,7 +72,7 @@ def _solver(selector: Selector) -> str:
 
 
 def _described(value: Any) -> str:
-    """A parameter's value; of a file that it names, the contents as well."""
+    """Write a parameter's value; of a file that it names, the contents as well."""
     if isinstance(value, str) and os.path.isfile(value):
         return f"{value!r} {digest_of_file(value)}"
     return repr(value)

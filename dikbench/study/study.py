@@ -81,7 +81,7 @@ class Study(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 def shipped_studies() -> dict[str, Path]:
-    """The studies that come with dikbench, by name."""
+    """Return the files of the studies that come with dikbench, by name."""
     folder = Path(str(resources.files("dikbench.study") / "studies"))
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
@@ -113,7 +113,7 @@ def load_study(name_or_file: str) -> Study:
 
 
 def _spread(study: Study) -> Study:
-    """The study with one value per parameter in each of its selectors (see `alternatives`)."""
+    """Return the study with one value per parameter in each selector (see `alternatives`)."""
     timing, example = study.timing, study.example
     if timing is not None:
         timing = msgspec.structs.replace(timing, scenarios=_each("scenarios", timing.scenarios))
@@ -147,7 +147,7 @@ def _canonical(axis: str, selector: Selector) -> Selector:
 
 
 def _explained(reason: str) -> str:
-    """An error of msgspec, with the valid keys where the key was wrong."""
+    """Explain an error of msgspec, with the valid keys where the key was wrong."""
     if "Invalid enum value" in reason:
         return f"{reason}; valid: {', '.join(SPLITS if 'split' in reason else REFERENCE_MODES)}"
     if "unknown field" not in reason:
@@ -169,7 +169,7 @@ class Selection(msgspec.Struct, frozen=True):
 
 
 def select(base: Study, selection: Selection, *, named: bool) -> Study:
-    """A study with some of its axes replaced.
+    """Return a study with some of its axes replaced.
 
     A formulation that is given without a solver keeps the solvers that a named study has for it;
     otherwise it runs with the default solver.

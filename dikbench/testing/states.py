@@ -83,7 +83,7 @@ def states() -> Iterator[State]:
 
 
 def _configurations(robot: Robot, random: np.random.Generator) -> Iterator[tuple[str, Array]]:
-    """Configurations inside the limits, about one joint's limit, and exactly singular."""
+    """Yield configurations inside the limits, about one limit, and exactly singular."""
     position = robot.limits.position
     assert position is not None
     lower, upper = np.maximum(position.lower, -pi), np.minimum(position.upper, pi)
@@ -105,14 +105,14 @@ def _configurations(robot: Robot, random: np.random.Generator) -> Iterator[tuple
 
 
 def _twist(robot: Robot, random: np.random.Generator, speed: float) -> Array:
-    """A random twist that the arm knows, whose linear part has the given speed [m/s], (6,)."""
+    """Draw a twist (6,) that the arm can make, its linear part of the given speed [m/s]."""
     direction = np.zeros(6)
     direction[list(robot.task_rows)] = random.normal(size=len(robot.task_rows))
     return speed * direction / float(np.linalg.norm(direction[:3]))
 
 
 def _velocity_before(problem: DikProblem, before: str, random: np.random.Generator) -> Array | None:
-    """A velocity inside the velocity limits to have been applied last, (nv,) [rad/s], or None."""
+    """Draw the velocity applied last, inside the limits, (nv,) [rad/s]; or None."""
     if before == "unknown":
         return None
     robot, task = problem.robot, problem.tasks[0]
@@ -128,7 +128,7 @@ def _velocity_before(problem: DikProblem, before: str, random: np.random.Generat
 
 
 def _rows(problem: DikProblem, random: np.random.Generator) -> tuple[Array, Array]:
-    """Half-spaces that cut the velocity box, their normals of unit length; some of it is left."""
+    """Draw half-spaces that cut the velocity box and leave some of it, of unit normals."""
     box = velocity_box(problem.limits, problem.v_prev, problem.dt)
     inside = np.clip(np.zeros(problem.robot.nv), box.lower, box.upper)
     G = random.normal(size=(3, problem.robot.nv))
@@ -137,7 +137,7 @@ def _rows(problem: DikProblem, random: np.random.Generator) -> tuple[Array, Arra
 
 
 def _problem(robot: Robot, q: Array, twist: Array, *, posture: bool) -> DikProblem:
-    """The control step in which the frame is to move with a twist towards a target."""
+    """Pose the control step in which the frame is to move with a twist to a target."""
     kinematics = Kinematics(robot)
     kinematics.update(q.copy())
     # Less than half a turn away, so that the logarithm gives the twist back.

@@ -40,7 +40,7 @@ class Moving:
 
     @classmethod
     def of(cls, recording: Recording, nearness: npt.NDArray[np.int_]) -> Self:
-        """The motion of a recording; the nearness is given per velocity, (n + 1, nv)."""
+        """Compute the motion of a recording; the nearness is given per velocity, (n + 1, nv)."""
         robot, trace = recording.scenario.robot, recording.trace
         model, data = robot.model, robot.model.createData()
         tips, origins = [], []
@@ -61,7 +61,7 @@ class Moving:
 
 
 def animation(viewer: Any, view: Any, moving: Moving, speed: float) -> Any:
-    """The keyframes of a replay (`meshcat.animation.Animation`).
+    """Build the keyframes of a replay (`meshcat.animation.Animation`).
 
     Args:
         viewer: the `meshcat.Visualizer`, with the nodes `target`, `tool` and `joints`.

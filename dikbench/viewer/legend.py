@@ -25,7 +25,7 @@ LEGEND: Final = (
 
 
 def captions(recording: Recording, speed: float) -> list[str]:
-    """What is replayed, in lines."""
+    """Say what is replayed, in lines."""
     trial, trace = recording.trial, recording.trace
     solver = "" if trial.solver == NO_SOLVER else f" with {trial.solver}"
     ended = "" if recording.status == Status.OK.value else f", ended {recording.status}"

@@ -26,7 +26,7 @@ class Nearness(IntEnum):
 
 
 def nearness(trace: Trace, limits: JointLimits) -> npt.NDArray[np.int_]:
-    """The nearness of every joint, (n + 1, nv): before each step, with its speed, and at the end.
+    """Classify every joint, (n + 1, nv): before each step, with its speed, and at the end.
 
     A joint is past a limit where it is so by more than `VIOLATION_TOLERANCE`, as in the metrics.
     """
@@ -46,7 +46,7 @@ def nearness(trace: Trace, limits: JointLimits) -> npt.NDArray[np.int_]:
 
 
 def _share_of_range(at: Array, lower: Array, upper: Array) -> Array:
-    """Distance from the middle of a joint's range over half of it; 0 where it is unbounded."""
+    """Compute the distance from mid-range over half the range; 0 where it is unbounded."""
     with np.errstate(invalid="ignore"):  # infinity minus infinity
         middle, half = (lower + upper) / 2, (upper - lower) / 2
         share = np.abs(at - middle) / half

@@ -54,7 +54,7 @@ def serve_replay(recording: Recording, speed: float) -> None:
 
 @contextmanager
 def _scene(recording: Recording, speed: float) -> Iterator[Any]:
-    """A viewer with its server, filled with a recording; the server is ended after it."""
+    """Start a viewer filled with a recording, and end its server afterwards."""
     try:
         import meshcat
     except ImportError:

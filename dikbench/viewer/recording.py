@@ -78,7 +78,7 @@ def find_recording(text: str, results: Path | None = None) -> Recording:
 
 
 def newest_results(runs: Path) -> Path:
-    """The folder below `runs` whose results were written last.
+    """Return the folder below `runs` whose results were written last.
 
     Raises:
         DikbenchError: if there is none.

@@ -81,7 +81,7 @@ def _look_at(viewer: Any, points: Array, side: Array, size: float) -> None:
 
 
 def _side(robot: Robot, path: Array) -> Array:
-    """From where a path (k, 3) is seen best: above a planar arm, else obliquely in front of it."""
+    """Choose the side from which to see a path (k, 3): a planar arm's from above."""
     if 2 not in robot.task_rows:
         return np.array([0.0, -0.01, 1.0])
     x, y, _ = path.mean(axis=0)
@@ -90,7 +90,7 @@ def _side(robot: Robot, path: Array) -> Array:
 
 
 def _draw_path(node: Any, points: Array, colours: Indices, width: float) -> None:
-    """A line through points (k, 3) and a dot at each; browsers draw every line one pixel wide."""
+    """Draw a line through points (k, 3) and a dot at each: browsers draw thin lines only."""
     rgb = np.stack([(colours >> shift) % 256 for shift in (16, 8, 0)]) / 255
     position, colour = points.T.astype(np.float32), rgb.astype(np.float32)
     line = shapes.PointsGeometry(position, colour)
@@ -99,7 +99,7 @@ def _draw_path(node: Any, points: Array, colours: Indices, width: float) -> None
 
 
 def _draw_axes(node: Any, length: float, radius: float) -> None:
-    """The axes of a frame as bars along x, y and z."""
+    """Draw the axes of a frame as bars along x, y and z."""
     bar = pin.SE3(np.eye(3), np.array([0.0, length / 2, 0.0]))
     for name, turn, colour in zip("xyz", TURNS, AXES, strict=True):
         material = shapes.MeshLambertMaterial(color=colour)

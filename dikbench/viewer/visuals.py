@@ -17,7 +17,7 @@ THICKNESS: Final = 0.02
 
 
 def bodies(robot: Robot) -> Any:
-    """The robot's own geometry if it has any, else capsules (`pinocchio.GeometryModel`)."""
+    """Return the robot's own geometry, else capsules (`pinocchio.GeometryModel`)."""
     if robot.visuals is not None:
         try:
             visuals = robot.visuals()
@@ -33,7 +33,7 @@ def bodies(robot: Robot) -> Any:
 
 
 def capsules(robot: Robot) -> Any:
-    """A capsule from the base to the first joint, on to each next one, and to the task frame."""
+    """Build capsules from the base through the joints to the task frame."""
     model, geometry = robot.model, pin.GeometryModel()
     tip = model.frames[robot.frame_id]
     ends = [

@@ -91,7 +91,7 @@ class CollisionConstraint:
             raise DikbenchError(f"CollisionConstraint: rows={self.rows} must be at least 1")
 
     def pairs(self, robot: Robot) -> CollisionPairs:
-        """The pairs that the constraint is about.
+        """Return the pairs of bodies and obstacles that the constraint is about.
 
         Raises:
             DikbenchError: if there are none.
@@ -126,7 +126,7 @@ class CollisionConstraint:
         return G, h
 
     def distances(self, robot: Robot, q: Array) -> Array:
-        """The smallest distance over all pairs at each configuration (n, nq), (n,) [m]."""
+        """Compute the smallest distance over all pairs at configurations (n, nq), (n,) [m]."""
         pairs, kinematics = _pairs(self, robot), Kinematics(robot)
         smallest = []
         for configuration in q:
@@ -135,7 +135,7 @@ class CollisionConstraint:
         return np.array(smallest)
 
     def remainders(self, robot: Robot, q: Array) -> Array:
-        """What the linearisation leaves out of each step of a motion (n + 1, nq).
+        """Compute what the linearisation leaves out of each step of a motion (n + 1, nq).
 
             phi(q_(k+1)) - phi(q_k) - g(q_k) . (q_(k+1) - q_k)
 
@@ -160,7 +160,7 @@ class CollisionConstraint:
 
 
 def _room(robot: Robot, spare: Array, g: Array, v_prev: Array | None, dt: float) -> Array:
-    """How fast each pair may come nearer, (k,) [m/s], negative where it has to part.
+    """Compute how fast each pair may approach, (k,) [m/s]; negative: it must part.
 
     Args:
         robot: the robot, with its limits.
@@ -199,7 +199,7 @@ def _pairs(constraint: CollisionConstraint, robot: Robot) -> CollisionPairs:
 
 @lru_cache(maxsize=32)
 def _speeds(robot: Robot) -> Array:
-    """The joints' largest speeds, (nv,), for the way back."""
+    """Return the joints' largest speeds on the way back inside, (nv,) [rad/s or m/s]."""
     limit = robot.limits.velocity
     if limit is None:
         return np.full(robot.nv, UNLIMITED)

@@ -50,7 +50,7 @@ class TorqueConstraint:
         return unit_rows(G, h)
 
     def torques(self, robot: Robot, q: Array, v: Array, v_prev: Array, dt: float) -> Array:
-        """Torques of the steps of a motion by the recursive Newton-Euler algorithm.
+        """Compute the torques of a motion by the recursive Newton-Euler algorithm.
 
         Args:
             robot: the robot.
@@ -71,7 +71,7 @@ class TorqueConstraint:
 
 
 def effort_limits(robot: Robot) -> Interval:
-    """The effort limits in force, at least one of which is finite.
+    """Return the effort limits in force, at least one of which is finite.
 
     Raises:
         DikbenchError: if there are none.
@@ -86,6 +86,6 @@ def effort_limits(robot: Robot) -> Interval:
 
 
 def mass_matrix(robot: Robot, q: Array) -> Array:
-    """The joint-space mass matrix M(q), (nv, nv), symmetric."""
+    """Compute the joint-space mass matrix M(q), (nv, nv), symmetric."""
     upper: Array = np.triu(pin.crba(robot.model, robot.scratch, q))
     return upper + np.triu(upper, 1).T

@@ -38,7 +38,7 @@ class CentreOfMassTask:
         object.__setattr__(self, "target", target)
 
     def linearize(self, kinematics: Kinematics) -> LinearizedTask:
-        """The task at the configuration of `kinematics`.
+        """Linearise the task at the configuration of `kinematics`.
 
         Raises:
             DikbenchError: if the robot has no mass, or the weights are not one or three.

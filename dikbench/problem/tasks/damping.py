@@ -25,7 +25,7 @@ class DampingTask:
     priority: int = 2
 
     def linearize(self, kinematics: Kinematics) -> LinearizedTask:
-        """The task, which is the same at every configuration.
+        """Linearise the task, which is the same at every configuration.
 
         Raises:
             DikbenchError: if the weights do not fit the robot.

@@ -41,13 +41,13 @@ class OrientationTask:
     frame: str | None = None
 
     def rows(self, robot: Robot) -> tuple[int, ...]:
-        """The rows of the twist (linear; angular) that the task is about."""
+        """Return the rows of the twist (linear; angular) that the task is about."""
         return tuple(row for row in robot.task_rows if row >= 3)
 
     def linearize(
         self, kinematics: Kinematics, target: Any = None, velocity: Any = None
     ) -> LinearizedTask:
-        """The task at the configuration of `kinematics`.
+        """Linearise the task at the configuration of `kinematics`.
 
         Args:
             kinematics: the robot at its configuration.

@@ -40,13 +40,13 @@ class PoseTask:
     frame: str | None = None
 
     def rows(self, robot: Robot) -> tuple[int, ...]:
-        """The rows of the twist (linear; angular) that the task is about."""
+        """Return the rows of the twist (linear; angular) that the task is about."""
         return robot.task_rows
 
     def linearize(
         self, kinematics: Kinematics, target: Any = None, velocity: Any = None
     ) -> LinearizedTask:
-        """The task at the configuration of `kinematics`.
+        """Linearise the task at the configuration of `kinematics`.
 
         Args:
             kinematics: the robot at its configuration.

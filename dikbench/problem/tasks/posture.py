@@ -38,7 +38,7 @@ class PostureTask:
             raise DikbenchError(f"posture task: expected finite numbers, got {target}")
 
     def linearize(self, kinematics: Kinematics) -> LinearizedTask:
-        """The task at the configuration of `kinematics`.
+        """Linearise the task at the configuration of `kinematics`.
 
         Raises:
             DikbenchError: if the target is not an array of the robot's shape (nq,), or the weights
@@ -56,7 +56,7 @@ class PostureTask:
 
 
 def middle_posture(robot: Robot) -> Array:
-    """The middle of the position limits, (nq,), the target of joint centring.
+    """Return the middle of the position limits, (nq,), the target of joint centring.
 
     Raises:
         DikbenchError: if a joint has no position limits.

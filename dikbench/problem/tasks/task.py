@@ -101,7 +101,7 @@ class Task(Protocol):
         ...
 
     def linearize(self, kinematics: Kinematics) -> LinearizedTask:
-        """The task at the configuration of `kinematics`."""
+        """Return the task at the configuration of `kinematics`."""
         ...
 
 
@@ -114,7 +114,7 @@ class TrackingTask(Task, Protocol):
         ...
 
     def rows(self, robot: Robot) -> tuple[int, ...]:
-        """The rows of the twist (linear; angular) of the task frame that it is about."""
+        """Return the rows of the task frame's twist (linear; angular) that it is about."""
         ...
 
     def linearize(
@@ -125,7 +125,7 @@ class TrackingTask(Task, Protocol):
 
 
 def stacked(tasks: list[LinearizedTask]) -> LinearizedTask:
-    """Several tasks of one priority as one task, rows below each other."""
+    """Stack several tasks of one priority, rows below each other."""
     if len(tasks) == 1:
         return tasks[0]
     return _StackedTask(

@@ -33,7 +33,7 @@ class TrackingTogether:
         return self.tracking.priority
 
     def rows(self, robot: Robot) -> tuple[int, ...]:
-        """The rows of the twist of the task frame that the tracking is about."""
+        """Return the rows of the task frame's twist (linear; angular) that are tracked."""
         return self.tracking.rows(robot)
 
     def linearize(

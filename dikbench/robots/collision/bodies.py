@@ -24,7 +24,7 @@ POINT: Final = 1e-3
 
 
 def collision_bodies(robot: Robot) -> Any:
-    """The bodies of a robot, as a `pinocchio.GeometryModel` for its model, without pairs.
+    """Build the bodies of a robot, a `pinocchio.GeometryModel` for its model, without pairs.
 
     Those of its URDF's collision geometry: primitive shapes as they are, around each mesh a capsule
     that contains all its vertices (and with them the mesh, a capsule being convex), so that
@@ -52,7 +52,7 @@ def _from_urdf(robot: Robot) -> Any:
 
 @lru_cache(maxsize=8)
 def _fitted(urdf: str) -> tuple[Any, Any]:
-    """The model of a URDF, all joints moving, and its collision geometry with fitted capsules."""
+    """Load a URDF, all joints moving, and fit capsules to its collision geometry."""
     # A package:// path starts at one of the folders above the file.
     folders = [str(folder) for folder in Path(urdf).resolve().parents]
     with captured_stderr() as complaints:
@@ -88,7 +88,7 @@ def _along_links(model: Any) -> Any:
 
 
 def _ends(model: Any, joint: int) -> list[Array]:
-    """Where the links of a joint end: at the next joints or, where there is none, at its frames."""
+    """Return where the links of a joint end: at the next joints, or else at its frames."""
     ends = [model.jointPlacements[child].translation for child in model.children[joint]]
     if not ends:
         ends = [

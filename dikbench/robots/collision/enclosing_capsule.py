@@ -16,7 +16,7 @@ HAIR = 1e-9
 
 
 def enclosing_capsule(points: Array) -> tuple[Array, Array, float]:
-    """A capsule that contains every point, along that principal axis which makes it smallest.
+    """Compute the smallest capsule along a principal axis that contains every point.
 
     Args:
         points: (n, 3) [m].
@@ -32,7 +32,7 @@ def enclosing_capsule(points: Array) -> tuple[Array, Array, float]:
 
 
 def _along(points: Array, axis: Array) -> tuple[Array, Array, float]:
-    """The capsule about points (n, 3) whose segment is along a unit vector (3,)."""
+    """Compute the capsule about points (n, 3) whose segment is along a unit vector (3,)."""
     height = points @ axis
     flat = points - np.outer(height, axis)
     centre = _circle_centre(flat)
@@ -47,7 +47,7 @@ def _along(points: Array, axis: Array) -> tuple[Array, Array, float]:
 
 
 def _circle_centre(points: Array) -> Array:
-    """The centre (3,), almost, of the smallest circle about points (n, 3) of a plane."""
+    """Approximate the centre (3,) of the smallest circle about points (n, 3) of a plane."""
     centre: Array = points.mean(axis=0)
     for number in range(1, ROUNDS):
         away = points - centre

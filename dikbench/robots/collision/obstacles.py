@@ -34,7 +34,7 @@ class SphereObstacle:
         _check_length("SphereObstacle: radius", self.radius)
 
     def geometry(self) -> tuple[Any, Any]:
-        """Its shape (coal) and its placement in the world (`pinocchio.SE3`)."""
+        """Return its shape (coal) and its placement in the world (`pinocchio.SE3`)."""
         return coal.Sphere(self.radius), pin.SE3(np.eye(3), np.array(self.centre))
 
 
@@ -60,7 +60,7 @@ class CapsuleObstacle:
             raise DikbenchError("CapsuleObstacle: start and end are one point; use SphereObstacle")
 
     def geometry(self) -> tuple[Any, Any]:
-        """Its shape (coal) and its placement in the world (`pinocchio.SE3`)."""
+        """Return its shape (coal) and its placement in the world (`pinocchio.SE3`)."""
         return capsule(np.array(self.start), np.array(self.end), self.radius)
 
 
@@ -90,7 +90,7 @@ class BoxObstacle:
         object.__setattr__(self, "rotation", tuple(map(tuple, R.tolist())))
 
     def geometry(self) -> tuple[Any, Any]:
-        """Its shape (coal) and its placement in the world (`pinocchio.SE3`)."""
+        """Return its shape (coal) and its placement in the world (`pinocchio.SE3`)."""
         return coal.Box(*self.size), pin.SE3(np.array(self.rotation), np.array(self.centre))
 
 
@@ -98,7 +98,7 @@ Obstacle = SphereObstacle | CapsuleObstacle | BoxObstacle
 
 
 def capsule(start: Array, end: Array, radius: float) -> tuple[Any, Any]:
-    """A capsule about a segment (3,) (3,) [m]: its shape (coal), which is along z, and placement.
+    """Build a capsule (coal, along its own z) about a segment (3,), (3,) [m], and its placement.
 
     A sphere where the segment is a point.
     """

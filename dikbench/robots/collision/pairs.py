@@ -73,17 +73,17 @@ class CollisionPairs:
         self._place()
 
     def __len__(self) -> int:
-        """Number of pairs."""
+        """Return the number of pairs."""
         return len(self.names)
 
     def distances(self, kinematics: Kinematics) -> Array:
-        """Signed distances at a configuration, (p,) [m]."""
+        """Compute the signed distances at a configuration, (p,) [m]."""
         kinematics.place_bodies(self._geometry, self._placed)
         pin.computeDistances(self._geometry, self._placed)
         return np.array([result.min_distance for result in self._results])
 
     def gradients(self, kinematics: Kinematics, pairs: Indices) -> Array:
-        """dphi/dq of some pairs, (k, nv) [m/rad or 1], at the configuration of `distances`.
+        """Compute dphi/dq of some pairs, (k, nv) [m/rad or 1], at the last `distances`.
 
         Zero where the nearest points have no direction from each other (axes that cross).
         """
@@ -135,7 +135,7 @@ def _adjacent(model: Any, first: int, second: int) -> bool:
 
 
 def _moved(model: Any) -> Array:
-    """Which velocities move the bodies of each joint: 1 or 0, (njoints, nv)."""
+    """Mark the velocities that move the bodies of each joint: 1 or 0, (njoints, nv)."""
     moved = np.zeros((model.njoints, model.nv))
     for joint in range(1, model.njoints):
         for support in model.supports[joint]:

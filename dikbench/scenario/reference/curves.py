@@ -20,7 +20,7 @@ FLAT: Final = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
 
 
 def plane_of(robot: Robot) -> Array:
-    """The plane in which a robot's curves lie, (3, 2)."""
+    """Return the plane in which a robot's curves lie, its two axes as columns (3, 2)."""
     return UPRIGHT if 2 in robot.task_rows else FLAT
 
 
@@ -33,7 +33,7 @@ def circle(
     plane: Array = UPRIGHT,
     turn: float = 0.0,
 ) -> Reference:
-    """A circle through `start`, its point with the smallest second coordinate.
+    """Build a circle through `start`, its point with the smallest second coordinate.
 
         p = p_0 + P radius (sin w tau, 1 - cos w tau),   w = 2 pi / period
 
@@ -65,7 +65,7 @@ def lemniscate(
     plane: Array = UPRIGHT,
     turn: float = 0.0,
 ) -> Reference:
-    """A figure of eight that crosses itself in `start`.
+    """Build a figure of eight that crosses itself in `start`.
 
         p = p_0 + P size (sin w tau, sin(2 w tau) / 2),   w = 2 pi / period
 
@@ -97,7 +97,7 @@ def _curve(
     plane: Array,
     turn: float,
 ) -> Reference:
-    """A curve given by its offset from `start` at an angle, (2,) [m], and the derivative of it."""
+    """Build a curve from its offset from `start` at an angle, (2,) [m], and its derivative."""
     first: Array = start.rotation.copy()
     origin = start.translation.copy()
     normal = np.cross(plane[:, 0], plane[:, 1])

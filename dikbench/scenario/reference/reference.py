@@ -41,13 +41,13 @@ class Reference:
 
 
 def target_at_rest(target: Any, duration: float) -> Reference:
-    """A placement that is wanted from the first instant on (a step)."""
+    """Build a reference that rests at a placement from the first instant on (a step)."""
     zero = np.zeros(6)
     return Reference(duration, lambda tau: target, lambda tau: zero, moving=False)
 
 
 def screw_path(middle: Any, twist: Array, duration: float) -> Reference:
-    """A constant body twist (6,) through `middle`, which it passes at half the duration.
+    """Build a constant body twist (6,) that passes `middle` at half the duration.
 
     X_d(tau) = middle exp6((tau - duration/2) twist).
     """
@@ -64,7 +64,7 @@ def joint_path(
     velocity: Callable[[float], Array],
     duration: float,
 ) -> Reference:
-    """The motion of the task frame along a joint motion: tau -> q (nq,), tau -> dq/dtau (nv,)."""
+    """Build the task frame's motion along a joint motion tau -> q (nq,), tau -> dq/dtau (nv,)."""
     kinematics = Kinematics(robot)
 
     def placement(tau: float) -> Any:

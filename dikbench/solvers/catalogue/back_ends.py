@@ -145,7 +145,7 @@ class Solver:
 
 
 def is_installed(name: str) -> bool:
-    """Whether the back end of this name can be imported here."""
+    """Say whether the back end of this name can be imported here."""
     return importlib.util.find_spec(BACK_ENDS[name].package) is not None
 
 
@@ -182,7 +182,7 @@ def parse_solver(text: str | Selector) -> Solver:
 
 
 def why_not(solver: Solver, program: ProgramKind) -> str:
-    """Why this solver cannot take this kind of program; empty where it can."""
+    """Say why this solver cannot take this kind of program; empty where it can."""
     back_end = BACK_ENDS[solver.name]
     if program == "cvxpy":
         if solver.interface == "warm":

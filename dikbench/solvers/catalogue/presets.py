@@ -58,7 +58,7 @@ _SETTINGS: Final[Mapping[str, Callable[[float], Mapping[str, Any]]]] = MappingPr
 
 
 def preset_settings(solver: str, preset: Preset) -> Mapping[str, Any]:
-    """The settings of a solver under a preset."""
+    """Return the settings of a solver under a preset."""
     if preset == "default":
         return {}
     return _SETTINGS[solver](MARGIN * TOLERANCES[preset])

@@ -65,7 +65,7 @@ class _Shape:
 
 
 def _in_modelling_words(program: QuadraticProgram) -> tuple[Any, tuple[Any, ...]]:
-    """The compiled problem of this program's shape, its parameters set to this program's values."""
+    """Return the compiled problem of this program's shape with this program's values."""
     shape = _Shape(
         len(program.q),
         0 if program.b is None else len(program.b),
@@ -91,7 +91,7 @@ def _in_modelling_words(program: QuadraticProgram) -> tuple[Any, tuple[Any, ...]
 
 
 def _finite(bound: Array | None) -> tuple[int, ...]:
-    """Indices of the finite entries of a bound."""
+    """Return the indices of the finite entries of a bound."""
     return () if bound is None else tuple(int(i) for i in np.flatnonzero(np.isfinite(bound)))
 
 
@@ -121,7 +121,7 @@ def _compiled(shape: _Shape) -> tuple[Any, Any, dict[str, Any]]:
 
 
 def _root(P: Array) -> Array:
-    """R with R^T R = P for a positive semidefinite P (n, n)."""
+    """Compute R with R^T R = P for a positive semidefinite P (n, n)."""
     values, vectors = scipy.linalg.eigh(P)
     root: Array = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
     return root

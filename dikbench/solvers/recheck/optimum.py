@@ -32,7 +32,7 @@ PROVEN: Final = 1e-4
 def distance_to_optimum(
     programs: Sequence[QuadraticProgram], answers: Sequence[Answer], nearness: Array
 ) -> Array:
-    """Distance of each answer's x from the optimum.
+    """Compute the distance of each answer's x from the optimum.
 
     Where P is positive definite the optimum x* is unique and this is max |x - x*| [rad/s]: near a
     singularity the cost is so flat that small residuals allow wrong velocities. Elsewhere it is the

@@ -40,7 +40,7 @@ class Residuals:
         self.nearness = nearness
 
     def within(self, tolerance: float) -> Mask:
-        """Whether every residual that can be known is within a tolerance, (k,); NaN is not."""
+        """Say whether every residual that is known is within a tolerance, (k,); NaN is not."""
         good: Mask = self.primal <= tolerance
         if self.explained:
             good = good & (self.dual <= tolerance) & (self.gap <= tolerance)
@@ -83,7 +83,7 @@ def residuals(stack: Stack) -> Residuals:
 
 
 def _one_sided(stack: Stack) -> list[tuple[Array, Array]]:
-    """The inequalities and bounds with their multipliers, (k, .) each."""
+    """Pair the inequalities and bounds with their multipliers, (k, .) each."""
     pairs = []
     if stack.h is not None and stack.z is not None:
         pairs.append((stack.h, stack.z))
@@ -121,7 +121,7 @@ def _nearness(stack: Stack, gradient: Array, slack: Array) -> Array:
 
 
 def _softness(P: Array) -> Array:
-    """1/mu for each of P (k, n, n), with mu not above its smallest eigenvalue; infinity elsewhere.
+    """Compute 1/mu for P (k, n, n), mu a lower bound on the eigenvalues; infinite if indefinite.
 
     One mu for all is guessed from a few and proved by a factorisation of P - mu I, which is faster
     than an inverse of each.

@@ -57,7 +57,7 @@ def _stacked(owners: Sequence[QuadraticProgram] | Sequence[Answer], part: str) -
 
 
 def structure(program: QuadraticProgram, answer: Answer) -> tuple[object, ...]:
-    """What programs and answers must have in common to be stacked."""
+    """Return what programs and answers must have in common to be stacked."""
     A, G = program.A, program.G
     return (
         len(program.q),

@@ -73,7 +73,7 @@ class ClarabelWorkspace:
         self._solver = clarabel.DefaultSolver(P, program.q, A, b, cones, settings)
 
     def _values(self, program: QuadraticProgram) -> tuple[Array, Array, Array]:
-        """Values of P and A in the order of their patterns, and the right-hand side."""
+        """Return the values of P and A in the order of their patterns, and the right-hand side."""
         assert self._finite is not None
         inequalities, upper, lower = self._finite
         rows, sides = [], []
@@ -107,6 +107,6 @@ class ClarabelWorkspace:
 
 
 def _finite(bound: Array | None) -> Indices:
-    """Indices of the finite entries of a bound."""
+    """Return the indices of the finite entries of a bound."""
     none: Indices = np.empty(0, dtype=int)
     return none if bound is None else np.flatnonzero(np.isfinite(bound))

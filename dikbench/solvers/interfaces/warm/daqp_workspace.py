@@ -79,7 +79,7 @@ class DaqpWorkspace:
 
 
 def _is_fixed(upper: Array | None, lower: Array | None) -> bool:
-    """Whether bounds cannot have changed: away from limits each step has the same, read-only."""
+    """Say whether bounds are read-only, so that the same arrays hold the same values."""
     return (upper is None or not upper.flags.writeable) and (
         lower is None or not lower.flags.writeable
     )
