@@ -53,7 +53,7 @@ def check_family_ranges(family: Family) -> None:
     What is outside of a range, and NaN, must be refused by an error that names the parameter.
     """
     for name, parameter in parameters_of(type(family)).items():
-        if not {int, float} & {parameter.type, *get_args(parameter.type)}:
+        if not _is_of(parameter, int, float):
             continue
         if parameter.range is None:
             raise AssertionError(f"{name} is a number without a Range")
@@ -81,14 +81,18 @@ def _changed(family: Family, name: str, value: object) -> Family:
     return replace(family, **changes)
 
 
+def _is_of(parameter: Parameter, *kinds: type) -> bool:
+    return any(part in kinds for part in (parameter.type, *get_args(parameter.type)))
+
+
 def _outside(parameter: Parameter) -> list[float]:
     """Numbers that a parameter must not be: NaN, infinity, and what is next to its ends."""
     found = [nan, np.inf, -np.inf]
     assert parameter.range is not None
     for end, away in ((parameter.range.low, -1.0), (parameter.range.high, 1.0)):
         if isfinite(end):
-            whole = int in (parameter.type, *get_args(parameter.type))
-            found.append(end + away if whole else end + away * max(1e-6, 1e-6 * abs(end)))
+            step = 1.0 if _is_of(parameter, int) else max(1e-6, 1e-6 * abs(end))
+            found.append(end + away * step)
     return [value for value in found if not parameter.range.holds(value)]
 
 
@@ -98,9 +102,8 @@ def _ends(parameter: Parameter) -> list[float]:
     ends = [parameter.range.low, parameter.range.high]
     if parameter.drawn is not None and not isnan(parameter.drawn.low):
         ends += [parameter.drawn.low, parameter.drawn.high]
-    whole = int in (parameter.type, *get_args(parameter.type))
     finite = [end for end in dict.fromkeys(ends) if isfinite(end)]
-    return [int(end) for end in finite] if whole else finite
+    return [int(end) for end in finite] if _is_of(parameter, int) else finite
 
 
 def check_family_certificate(family: Family) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -61,6 +63,31 @@ SELECTORS = [
     for robot in certified_robots(family)
     for extra in EXTRA.get((name, robot), [""])
 ]
+FIRST = {next(s for s in SELECTORS if s.startswith(f"{name}[")) for name in CLOSED}
+"""Of each family, the selector with the robot that it is made for."""
+
+
+def in_turns(seeds: tuple[int, ...]) -> list[Any]:
+    """Every selector with every seed; the normal run has one seed of each, in turns.
+
+    The first selector of a family has all of them there too.
+    """
+    return [
+        pytest.param(
+            selector,
+            seed,
+            marks=() if seed == seeds[k % len(seeds)] or selector in FIRST else pytest.mark.long,
+        )
+        for k, selector in enumerate(SELECTORS)
+        for seed in seeds
+    ]
+
+
+ONCE_A_FAMILY = [
+    pytest.param(selector, marks=() if selector in FIRST else pytest.mark.long)
+    for selector in SELECTORS
+]
+"""Every selector; the normal run has the first one of each family."""
 
 
 def _placement(robot: Robot, q: Array) -> pin.SE3:
@@ -84,8 +111,7 @@ def _margin(robot: Robot, q: Array) -> float:
 # --- every family, robot and seed
 
 
-@pytest.mark.parametrize("seed", [0, *SEEDS])
-@pytest.mark.parametrize("selector", SELECTORS)
+@pytest.mark.parametrize(("selector", "seed"), in_turns((0, *SEEDS)))
 def test_scenarios_hold_what_they_claim_and_fit_together(selector: str, seed: int) -> None:
     """The certificate holds, and the start is inside the limits, on the path, and as fast as it."""
     scenario = make_scenario(selector, seed)
@@ -123,8 +149,7 @@ def test_scenarios_hold_what_they_claim_and_fit_together(selector: str, seed: in
         assert velocity.usage(scenario.v0).max() == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize("seed", [0, 1])
-@pytest.mark.parametrize("selector", SELECTORS)
+@pytest.mark.parametrize(("selector", "seed"), in_turns((0, 1)))
 def test_reference_velocity_is_the_derivative_of_its_placement(selector: str, seed: int) -> None:
     """The body twist of the path, by central differences, all along it (but for its own kink)."""
     reference = make_scenario(selector, seed).reference
@@ -146,7 +171,7 @@ def _samples(scenario: Scenario) -> list[Array]:
     ]
 
 
-@pytest.mark.parametrize("selector", SELECTORS)
+@pytest.mark.parametrize("selector", ONCE_A_FAMILY)
 def test_the_same_seed_is_the_same_scenario(selector: str) -> None:
     """To the bit: start, velocity, path, duration and certificate."""
     a, b = make_scenario(selector, 3), make_scenario(selector, 3)
@@ -157,7 +182,7 @@ def test_the_same_seed_is_the_same_scenario(selector: str) -> None:
     assert a.certificate == b.certificate
 
 
-@pytest.mark.parametrize("selector", SELECTORS)
+@pytest.mark.parametrize("selector", ONCE_A_FAMILY)
 def test_every_seed_is_another_scenario(selector: str) -> None:
     """Start and path differ between any two of them, by no more than a perturbation."""
     scenarios = [make_scenario(selector, seed) for seed in (0, *SEEDS)]

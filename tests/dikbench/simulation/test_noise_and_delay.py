@@ -111,7 +111,7 @@ def test_selectors_of_plants() -> None:
         ("idle", ["unknown plant 'idle'", "'ideal'", "saturating"]),
         ("ideal[noise=-1]", ["noise=-1.0 must be finite and at least 0"]),
         ("ideal[noise=inf]", ["noise=inf must be finite"]),
-        ("ideal[delay=1001]", ["delay=1001 must be 0 to 1000 steps"]),
+        ("ideal[delay=1001]", ["delay=1001 must be 0 to 1000 [steps]"]),
         ("ideal[delay=0.5]", ["delay='0.5' is not valid"]),
         ("ideal[lag=1]", ["unknown parameter of plant ideal 'lag'", "delay, noise"]),
         ("ideal[drive=x]", ["unknown parameter of plant ideal 'drive'"]),
