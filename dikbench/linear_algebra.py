@@ -1,4 +1,4 @@
-"""Dense factorisations of the size of a robot arm, through LAPACK without numpy's wrappers."""
+"""Dense linear algebra of small matrices, through LAPACK without numpy's wrappers."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from dikbench.arrays import Array
 
 Projector = Literal["exact", "damped"]
 
-ILL_CONDITIONED = 1e-4
-"""Ratio of the pivots of a Gram matrix's triangle below which it is not to be trusted."""
+SMALLEST_PIVOT_RATIO = 1e-4
+"""A Gram matrix whose smallest pivot is a smaller share of its largest is ill-conditioned."""
 
 
 def thin_svd(A: Array) -> tuple[Array, Array, Array]:
@@ -30,7 +30,8 @@ def rank(singular: Array, tolerance: float) -> int:
 def pseudo_inverse(A: Array, tolerance: float) -> Array:
     """Compute the Moore-Penrose inverse (n, m) of A (m, n).
 
-    The tolerance is absolute, in the units of A: a relative one blows up where A itself vanishes.
+    Singular values up to `tolerance` count as zero. It is absolute, in the units of A: the inverse
+    of a relative one grows without bound where A itself vanishes.
     """
     U, singular, Vt = thin_svd(A)
     k = rank(singular, tolerance)
@@ -50,15 +51,16 @@ def damped_least_squares(A: Array, b: Array, squared_damping: float) -> Array:
     """Compute the minimiser (n,) of ||A x - b||^2 + lambda^2 ||x||^2 for A (m, n), b (m,).
 
     The smaller of the two Gram matrices is factorised: A A^T where the rows are fewer, else A^T A.
-    Where that would lose more than half of the digits, (almost) undamped at a singularity, the
-    singular values serve instead; undamped where rank is lost, the shortest minimiser.
+    Where that would lose more than half of the digits (at a singularity with hardly any damping)
+    the singular values are used instead. Where rank is lost without damping this is the shortest
+    minimiser.
     """
     m, n = A.shape
     damped = A.dot(A.T) if m <= n else A.T.dot(A)
     damped.flat[:: len(damped) + 1] += squared_damping
     factor, y, info = dposv(damped, b if m <= n else b.dot(A))
     pivots = factor.diagonal().tolist()  # their ratio bounds the condition number, from below
-    if info or min(pivots) < ILL_CONDITIONED * max(pivots):
+    if info or min(pivots) < SMALLEST_PIVOT_RATIO * max(pivots):
         lost = np.finfo(float).eps * max(m, n) * float(np.linalg.norm(A))
         return DampedInverse(A, lost, squared_damping**0.5).times(b)
     x: Array = y.dot(A) if m <= n else y
@@ -82,7 +84,7 @@ def solve_positive_definite(A: Array, b: Array) -> Array | None:
 def null_space(A: Array, tolerance: float) -> Array:
     """Compute an orthonormal basis of the null space of A (m, n), columns (n, n - rank).
 
-    Singular values up to `tolerance` (absolute, in the units of A) are taken as zero.
+    Singular values up to `tolerance` (absolute, in the units of A) count as zero.
     """
     _, singular, Vt, _ = dgesdd(A, full_matrices=1)
     basis: Array = Vt[int(np.count_nonzero(singular > tolerance)) :].T
@@ -92,8 +94,8 @@ def null_space(A: Array, tolerance: float) -> Array:
 class DampedInverse:
     """A^# = A^T (A A^T + lambda^2 I)^-1, (n, m), of a matrix A (m, n), by its singular values.
 
-    Those up to `tolerance` (absolute, in the units of A) are taken as zero. With no damping it is
-    the Moore-Penrose inverse A^+.
+    Singular values up to `tolerance` (absolute, in the units of A) count as zero. Without damping
+    it is the Moore-Penrose inverse A^+.
     """
 
     __slots__ = ("_U", "_Vt", "_damped", "_kept", "_singular")
@@ -115,8 +117,8 @@ class DampedInverse:
         """Compute the part of the velocity space that A uses, (n, n); I minus it is left free.
 
         Args:
-            projector: "exact": A^+ A, the orthogonal projector onto the row space of A; "damped":
-                A^# A, which with damping is no projector.
+            projector: "exact" for A^+ A, the orthogonal projector onto the row space of A; "damped"
+                for A^# A, which is not a projector when lambda > 0.
         """
         if projector == "exact":
             share = self._kept.astype(float)
@@ -131,8 +133,8 @@ class DampedInverse:
 def inverse_and_row_space(A: Array, tolerance: float, damping: float = 0.0) -> tuple[Array, Array]:
     """Compute the (damped) inverse (n, m) of A (m, n) and an orthonormal row basis (r, n).
 
-    Singular values s up to the (absolute) tolerance count as zero, r are above it; their inverse is
-    s / (s^2 + damping^2). I - basis^T basis projects onto the null space of A, damped or not.
+    The r singular values s above the (absolute) tolerance have the inverse s / (s^2 + damping^2),
+    the others count as zero. I - basis^T basis projects onto the null space of A.
     """
     U, singular, Vt, _ = dgesdd(A, full_matrices=0)
     rank = int((singular > tolerance).sum())
@@ -144,7 +146,7 @@ def inverse_and_row_space(A: Array, tolerance: float, damping: float = 0.0) -> t
 def volume(A: Array) -> float:
     """Compute sqrt(det(A A^T)) of A (m, n), the product of its singular values if m <= n.
 
-    From the triangle R of A^T = Q R: a Gram matrix would lose half of the digits.
+    It is computed from R of A^T = Q R, since a Gram matrix would lose half of the digits.
     """
     m, n = A.shape
     if m > n:

@@ -23,20 +23,20 @@ _PRIORITY: Final = attrgetter("priority")
 
 
 class DikProblem(msgspec.Struct, eq=False):
-    """One control step: where the robot is, what is wanted of it, what it may do.
+    """One control step: the configuration, the tasks, the limits.
 
     The tasks may be given in any order: they are sorted by priority when the problem is made, and
     those of one priority keep the order in which they were given.
 
     Attributes:
-        robot: the robot; `robot.scratch` is free for a formulation's own kinematics.
+        robot: the robot; a formulation may use `robot.scratch` for its own kinematics.
         q: configuration, (nq,).
         v_prev: the velocity that the plant applied last, (nv,); None: no acceleration bound.
         dt: control period [s].
         tasks: the linearised tasks J v = V, most important first, as a tuple.
         limits: the limits in force, as seen from q.
         relaxed: joints whose acceleration bound `box` had to give up (a record, see `box`).
-        G, h: what else must hold, G v <= h, (p, nv) and (p,); None where nothing else must (see
+        G, h: constraints G v <= h in addition, (p, nv) and (p,); None without any (see
             `dikbench.problem.constraints`).
     """
 
@@ -80,33 +80,33 @@ class DikProblem(msgspec.Struct, eq=False):
 
 
 class Solve(Protocol):
-    """A solver, handed to a formulation: timed, counted, its answers rechecked."""
+    """The solver of a formulation: timed, counted, its answers rechecked."""
 
     def __call__(self, program: QuadraticProgram | ModelledProgram) -> Array:
         """Solve a program and return x.
 
         Raises:
             Infeasible: the program has no feasible point.
-            SolverFailed: the solver gave no answer although there is one.
+            SolverFailed: the solver gave no answer to a feasible program.
         """
         ...
 
 
 @runtime_checkable
 class Formulation(Protocol):
-    """A law of differential inverse kinematics: a frozen dataclass whose fields are parameters.
+    """A formulation of differential inverse kinematics: a frozen dataclass of parameters.
 
-    In addition to `velocity` it may declare, as class attributes or properties, `program` (what it
-    needs a solver for; default: none) and `keeps` (the limits it promises to keep; default: none);
-    a paragraph `Source: ...` in its docstring names the paper. The same problem gives the same
-    velocity.
+    In addition to `velocity` it may declare, as class attributes or properties, `program` (the kind
+    of program it has solved; default: none) and `keeps` (the limits it promises to keep; default:
+    none); a paragraph `Source: ...` in its docstring names the paper. The same problem gives the
+    same velocity.
     """
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """Compute the joint velocity of this control step, (nv,) [rad/s or m/s].
 
         Raises:
-            CannotAnswer: as `Infeasible` or `SolverFailed`; the harness applies the fallback.
+            CannotAnswer: `Infeasible` or `SolverFailed`; the harness then applies the fallback.
         """
         ...
 

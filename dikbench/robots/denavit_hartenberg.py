@@ -22,14 +22,14 @@ def denavit_hartenberg_arm(
         A_i(q) = Rot_z(q) Trans_z(d_i) Trans_x(a_i) Rot_x(alpha_i)
 
     Args:
-        name: the model's.
+        name: name of the model.
         table: a [m], alpha [rad], d [m] of each joint.
-        position_limits: of each joint, to both sides [rad].
-        velocity_limits: of each joint [rad/s].
+        position_limits: largest |q| of each joint [rad].
+        velocity_limits: largest |v| of each joint [rad/s].
 
     Returns:
-        A Pinocchio model with the frame `tool` at the end of the last row. Every link is a point of
-        1 kg at its end: no table of this kind says more.
+        A Pinocchio model with the frame `tool` at the end of the last row. Every link is a ball
+        of 1 kg at its end, since the table has no inertias.
     """
     model = pin.Model()
     model.name = name

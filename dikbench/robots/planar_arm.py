@@ -1,4 +1,4 @@
-"""A planar arm of any number of links, built in code: the smallest robot that has everything."""
+"""A planar arm of any number of links, built in code."""
 
 from __future__ import annotations
 
@@ -18,13 +18,12 @@ def planar_arm(
 
     Args:
         lengths: length of each link [m].
-        velocity_limits: of each joint [rad/s].
-        position_limit: lower and upper, of every joint [rad].
+        velocity_limits: largest |v| of each joint [rad/s].
+        position_limit: lower and upper limit of every joint [rad].
 
     Returns:
         A Pinocchio model with the frames `link1`, ... at the end of each link and `tip` at the end
-        of the last one. Every link weighs
-        1 kg, spread evenly along it.
+        of the last one. Every link has 1 kg, spread evenly along it.
     """
     model = pin.Model()
     model.name = f"planar{len(lengths)}r"

@@ -12,7 +12,7 @@ from dikbench.robots.kinematics import Kinematics
 
 
 class Constraint(Protocol):
-    """What the motion must keep beside the limits of its joints: a frozen dataclass.
+    """A condition on the motion in addition to the joint limits: a frozen dataclass.
 
     The number of rows is the same at every configuration, so that a solver can keep its workspace.
     """
@@ -28,8 +28,7 @@ class Constraint(Protocol):
             dt: control period [s].
 
         Returns:
-            G (p, nv), each row of unit length or zero, and h (p,): a residual of a row is in rad/s
-            (m/s), whatever the constraint is about.
+            G (p, nv), each row of unit length or zero, and h (p,) [rad/s or m/s].
         """
         ...
 

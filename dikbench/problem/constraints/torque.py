@@ -17,14 +17,14 @@ from dikbench.robots.robot import Robot
 
 @dataclass(frozen=True)
 class TorqueConstraint:
-    """The joints' torques stay within the effort limits of the robot.
+    """Keep the joint torques within the effort limits of the robot.
 
         tau = M(q) (v - v_prev)/dt + b(q, v_prev),   tau_min <= tau <= tau_max
 
-    with M the mass matrix and b gravity, centrifugal and Coriolis torques at the start of the step:
-    what the joints must exert to change the velocity from v_prev to v within it. A row per finite
-    effort limit, the upper ones first, [N m or N] before they are scaled. An unknown v_prev counts
-    as rest.
+    with M the mass matrix and b the gravity, centrifugal and Coriolis torques at the start of the
+    step: the torques that change the velocity from v_prev to v within it. There is a row per finite
+    effort limit, the upper ones first, in N m (N) before it is scaled. An unknown v_prev counts as
+    rest.
 
     Source: R. Featherstone, Rigid Body Dynamics Algorithms, Springer 2008 (equation of motion).
     """
@@ -43,7 +43,7 @@ class TorqueConstraint:
         rest = np.zeros(robot.nv)
         before = rest if v_prev is None else v_prev
         M = mass_matrix(robot, q)
-        # What the torque is at v = 0: the step that stops the robot.
+        # The torque at v = 0, of the step that stops the robot.
         stop = pin.rnea(robot.model, robot.scratch, q, before, -before / dt)
         G = np.vstack([M[above], -M[below]]) / dt
         h = np.concatenate([(limit.upper - stop)[above], (stop - limit.lower)[below]])
@@ -55,8 +55,8 @@ class TorqueConstraint:
         Args:
             robot: the robot.
             q: configurations at the start of each step, (n, nq).
-            v: velocities applied in it, (n, nv).
-            v_prev: the velocities before, (n, nv).
+            v: velocities applied in each step, (n, nv).
+            v_prev: velocities applied before each step, (n, nv).
             dt: control period [s].
 
         Returns:

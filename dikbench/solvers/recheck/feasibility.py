@@ -1,4 +1,4 @@
-"""Whether a program has any feasible point: the judge between a hard program and a bad solver."""
+"""Whether a program has a feasible point: an infeasible program or a failed solver?"""
 
 from __future__ import annotations
 

@@ -95,6 +95,8 @@ MALFORMED = [
 SHOWN = {
     "qp": "min_v",
     "near-miss[miss=0.05]": "required speed over limit",
+    "near-miss": "miss = 0.02: 0 or 0.001 to 0.2 [m; rad]  (instances: 0.002 to 0.05, logarithmic)",
+    "dls": "damping = 0.05: finite and at least 0  (tuned: 0.001 to 0.3, logarithmic)",
     "osqp": "eps_abs",
     "panda": "panda_hand_tcp",
     "off_course_max_rad": "unit: rad",
