@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import sqlite3
 import subprocess
@@ -10,6 +11,7 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import pandas as pd
@@ -44,6 +46,11 @@ def table(folder: Path) -> pd.DataFrame:
 def changed(**texts: str) -> Trial:
     """The trial with other selectors."""
     return Trial.of(**{**TRIAL.row, **texts})  # type: ignore[arg-type]
+
+
+def first_row(store: Store) -> dict[str, Any]:
+    """The first trial of a store, as numbers and texts of Python's."""
+    return {str(name): value for name, value in store.trials().iloc[0].to_dict().items()}
 
 
 @pytest.fixture(scope="module")
@@ -142,15 +149,17 @@ def test_a_changed_law_is_run_again_and_its_old_row_is_not_shown(tmp_path: Path)
     ("rerun", "again"),
     [("", 0), ("failed", 1), ("dls", 2), ("reach", 3), ("daqp[interface=warm]", 2), ("all", 6)],
 )
-def test_rerun_chooses_what_is_run_again(tmp_path: Path, rerun: str, again: int) -> None:
+def test_rerun_chooses_what_is_run_again(
+    undisturbed: Path, tmp_path: Path, rerun: str, again: int
+) -> None:
     """Failed trials, those of a formulation, scenario or solver, or all."""
-    run_study(STUDY, tmp_path, RunSettings(jobs=2), "first")
+    shutil.copytree(undisturbed, tmp_path, dirs_exist_ok=True)
     with Store(tmp_path / "results.sqlite") as store:
-        row = {str(name): value for name, value in store.trials().iloc[0].items()}
+        row = first_row(store)
         store.record_trial({**row, "status": "timeout"}, 1, 0)
     run_study(STUDY, tmp_path, RunSettings(jobs=2, rerun=rerun), "second")
     runs = load_results(tmp_path).trials["run"]
-    assert int((runs == 2).sum()) == again
+    assert int((runs > 1).sum()) == again
 
 
 def test_rerun_of_what_is_not_there_is_one_line(tmp_path: Path) -> None:
@@ -163,7 +172,7 @@ def test_rerun_of_what_is_not_there_is_one_line(tmp_path: Path) -> None:
 def test_status_counts_done_failed_and_missing(undisturbed: Path, tmp_path: Path) -> None:
     """By status, and what the last study still lacks."""
     assert status_of(undisturbed) == {"ok": 6}
-    run_study(STUDY, tmp_path, RunSettings(jobs=2), "first")
+    shutil.copytree(undisturbed, tmp_path, dirs_exist_ok=True)
     with sqlite3.connect(tmp_path / "results.sqlite") as database:
         database.execute("DELETE FROM trials WHERE formulation = 'dls'")
         database.execute("UPDATE trials SET status = 'crashed' WHERE formulation = 'qp'")
@@ -218,7 +227,7 @@ def test_a_store_that_is_harmed_under_the_run_is_noticed(
     target = tmp_path / "results.sqlite"
     target.write_bytes((undisturbed / "results.sqlite").read_bytes())
     with Store(target) as store:
-        row = {str(name): value for name, value in store.trials().iloc[0].items()}
+        row = first_row(store)
         if harm == "removed":
             target.unlink()
         elif harm == "cut":
@@ -264,6 +273,7 @@ def test_times_are_kept_and_taken_anew_on_request(tmp_path: Path) -> None:
 KILLED = """
 import sys
 from pathlib import Path
+from typing import Any
 from dikbench.run.runner import RunSettings, run_study
 sys.path.insert(0, {folder!r})
 from study_of_test import STUDY

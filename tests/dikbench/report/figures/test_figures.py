@@ -55,25 +55,32 @@ def files(figures: Iterable[Figure]) -> set[str]:
     return {figure.file for figure in figures if "profiles" not in figure.file}
 
 
-def test_every_kind_is_drawn(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Figure]]:
+    """A folder in which a table was drawn that has data for all figures, and the figures."""
+    folder = tmp_path_factory.mktemp("whole")
+    return folder, drawn_in(folder, random_rows(LAWS, SCENARIOS))
+
+
+def test_every_kind_is_drawn(whole: tuple[Path, list[Figure]]) -> None:
     """A table that has data for every figure but those against time gives them all."""
-    assert files(drawn_in(tmp_path, random_rows(LAWS, SCENARIOS))) == KINDS
+    assert files(whole[1]) == KINDS
 
 
-def test_the_same_table_gives_the_same_bytes(tmp_path: Path) -> None:
+def test_the_same_table_gives_the_same_bytes(
+    whole: tuple[Path, list[Figure]], tmp_path: Path
+) -> None:
     """Drawn twice, every file is the same to the last byte."""
-    trials, folders = random_rows(LAWS, SCENARIOS), [tmp_path / "1", tmp_path / "2"]
-    for folder in folders:
-        folder.mkdir()
-        drawn_in(folder, trials)
-    first, second = (sorted((folder / "figures").iterdir()) for folder in folders)
+    drawn_in(tmp_path, random_rows(LAWS, SCENARIOS))
+    first, second = (sorted((folder / "figures").iterdir()) for folder in (whole[0], tmp_path))
     assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
 
 
-def test_an_svg_may_stand_in_a_page(tmp_path: Path) -> None:
+def test_an_svg_may_stand_in_a_page(whole: tuple[Path, list[Figure]]) -> None:
     """No SVG has a style sheet, or names for groups that another one has too; each has a font."""
-    for figure in drawn_in(tmp_path, random_rows(LAWS, SCENARIOS)):
-        root = ElementTree.fromstring((tmp_path / "figures" / figure.file).read_bytes())
+    folder, figures = whole
+    for figure in figures:
+        root = ElementTree.fromstring((folder / "figures" / figure.file).read_bytes())
         tags = [element.tag.rpartition("}")[2] for element in root.iter()]
         assert "style" not in tags
         assert "text" in tags
