@@ -6,9 +6,9 @@
 
 from __future__ import annotations
 
+from dikbench.testing.asked import ROUNDING, Asked
 from dikbench.testing.contract import (
     CHECKS,
-    ROUNDING,
     Check,
     assert_within,
     check_acceleration_limits,
@@ -42,6 +42,7 @@ __all__ = [
     "CHECKS",
     "FAMILY_CHECKS",
     "ROUNDING",
+    "Asked",
     "Check",
     "FamilyCheck",
     "State",

@@ -14,7 +14,8 @@ import pickle
 from collections.abc import Callable
 from dataclasses import is_dataclass, replace
 from math import isfinite, isnan, nan
-from typing import Any, Final, get_args
+from types import UnionType
+from typing import Any, Final, Union, get_args, get_origin
 
 import numpy as np
 
@@ -82,7 +83,8 @@ def _changed(family: Family, name: str, value: object) -> Family:
 
 
 def _is_of(parameter: Parameter, *kinds: type) -> bool:
-    return any(part in kinds for part in (parameter.type, *get_args(parameter.type)))
+    union = get_origin(parameter.type) in (Union, UnionType)
+    return any(part in kinds for part in (get_args(parameter.type) if union else [parameter.type]))
 
 
 def _outside(parameter: Parameter) -> list[float]:

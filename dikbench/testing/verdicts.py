@@ -9,6 +9,7 @@ from typing import Final, Literal, NamedTuple
 
 from dikbench.problem.problem import Formulation, LimitKind, promises_of
 from dikbench.scenario.family import Family
+from dikbench.testing.asked import Asked
 from dikbench.testing.contract import (
     CHECKS,
     Check,
@@ -47,15 +48,17 @@ def verdicts_on_formulation(
     Raises:
         DikbenchError: if the solver is unknown or cannot take what the formulation needs solved.
     """
-    for check in CHECKS:
+    declaration = _verdict("declaration", partial(check_declaration, formulation, solver))
+    yield declaration
+    if declaration.outcome == "BROKEN":
+        return
+    asked = Asked(formulation, solver)
+    for check in CHECKS[1:]:
         name = check.__name__.removeprefix("check_").replace("_", " ")
         if check in PROMISES and PROMISES[check] not in promises_of(formulation):
             yield Verdict(name, "not promised")
-            continue
-        verdict = _verdict(name, partial(check, formulation, solver))
-        yield verdict
-        if check is check_declaration and verdict.outcome == "BROKEN":
-            return
+        else:
+            yield _verdict(name, partial(check, asked, None))
 
 
 def verdicts_on_family(family: Family) -> Iterator[Verdict]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from makers.problems import KeepsProgram, kinematics_at, problem_at
+from makers.problems import KeepsProgram, kinematics_at, problem_at, with_limits_in_force
 
 from dikbench import DikAnswer, Robot, load_robot, solve_dik
 from dikbench.arrays import Array
@@ -42,12 +42,7 @@ def label(record: dict[str, Any]) -> str:
 
 def limited(case: str, in_force: str) -> Robot:
     """The robot of a case with position limits (q), velocity limits (v), both or none in force."""
-    robot = load_robot(CASES[case]["robot"])
-    if "q" not in in_force:
-        robot = robot.with_limits(position=None)
-    if "v" not in in_force:
-        robot = robot.with_limits(velocity=None)
-    return robot
+    return with_limits_in_force(CASES[case]["robot"], in_force)
 
 
 def answer(law: str, robot: Robot, q: object, V: object, posture: Array) -> DikAnswer:

@@ -36,6 +36,24 @@ def planar_robot(*lengths: float, velocity: float) -> Robot:
     return Robot(f"planar{len(lengths)}r", model, "tip", model_limits(model), q0, (0, 1))
 
 
+def with_limits_in_force(name: str, kinds: str) -> Robot:
+    """A robot with position limits (q), velocity limits (v), both or none in force."""
+    robot = load_robot(name)
+    if "q" not in kinds:
+        robot = robot.with_limits(position=None)
+    return robot if "v" in kinds else robot.with_limits(velocity=None)
+
+
+def with_upper_limit(name: str, joint: int, upper: float) -> Robot:
+    """A robot of whose joints one has another upper position limit [rad]."""
+    robot = load_robot(name)
+    position = robot.limits.position
+    assert position is not None
+    highest = position.upper.copy()
+    highest[joint] = upper
+    return robot.with_limits(position=(position.lower, highest))
+
+
 def kinematics_at(robot: Robot, q: Array) -> Kinematics:
     """The kinematics of a robot at a configuration (nq,)."""
     kinematics = Kinematics(robot)

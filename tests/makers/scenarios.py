@@ -35,6 +35,9 @@ from scenarios.singular_postures import SINGULAR_POSTURES, SingularPosture
 RATE = np.array([0.5, -0.4, 0.6])
 """Of the joints of `planar_scenario` [rad/s]."""
 
+TWENTY_SEEDS = [range(4), pytest.param(range(4, 21), marks=pytest.mark.long)]
+"""Seeds for what must hold from any start: a few in the normal run, the others in the long one."""
+
 
 def planar_scenario(
     *,

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from makers.problems import with_upper_limit
 from makers.scenarios import metrics_of, put_robot, scenario_error
 
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_scenario
-from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
 
 TRIANGLE = Path(__file__).parents[1] / "data" / "triangle.csv"
@@ -112,13 +112,7 @@ def test_a_pose_that_cannot_be_had_is_named_by_its_line(
 
 def test_a_start_outside_the_limits_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the robot could take the first pose only beyond one of its limits."""
-    arm = load_robot("panda")
-    position = arm.limits.position
-    assert position is not None
-    upper = position.upper.copy()
-    upper[3] = -2.5
-    narrow = arm.with_limits(position=(position.lower, upper))
-    put_robot(monkeypatch, narrow)
+    put_robot(monkeypatch, with_upper_limit("panda", 3, -2.5))
     with pytest.raises(DikbenchError, match="position margin at the start"):
         make_scenario(f"csv[file={TRIANGLE}]")
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
-from makers.scenarios import metrics_of, put_robot, scenario_error
+from makers.problems import with_upper_limit
+from makers.scenarios import TWENTY_SEEDS, metrics_of, put_robot, scenario_error
 
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_scenario
-from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
 from scenarios.speed_sweep import SpeedSweep
 
@@ -20,10 +20,11 @@ VARIANTS = [
 ]
 
 
+@pytest.mark.parametrize("seeds", TWENTY_SEEDS, ids=["few", "many"])
 @pytest.mark.parametrize("selector", VARIANTS)
-def test_every_arm_sweeps_both_curves_from_twenty_starts(selector: str) -> None:
+def test_every_arm_sweeps_both_curves_from_twenty_starts(selector: str, seeds: range) -> None:
     """The certificate holds (building asserts it), with the peak speed that was asked for."""
-    for seed in range(21):
+    for seed in seeds:
         motion = make_scenario(selector, seed).motion
         assert motion is not None
         assert motion.peak_speed_ratio == pytest.approx(0.7, rel=0.02)
@@ -102,11 +103,7 @@ def test_below_the_limits_every_law_follows() -> None:
 
 def test_a_sweep_into_a_limit_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where a joint would meet its limit on the curve the case would be another one."""
-    arm = load_robot("ur5")
-    position = arm.limits.position
-    assert position is not None
-    upper = np.array([6.0, 6, 1.42, 6, 6, 6])
-    put_robot(monkeypatch, arm.with_limits(position=(position.lower, upper)))
+    put_robot(monkeypatch, with_upper_limit("ur5", 2, 1.42))
     with pytest.raises(DikbenchError, match="position margin"):
         make_scenario("speed-sweep[robot=ur5]")
 

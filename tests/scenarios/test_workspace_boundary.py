@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
+from makers.problems import with_upper_limit
 from makers.scenarios import metrics_of, put_robot, scenario_error
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_scenario
-from dikbench.robots.catalogue import load_robot
 from dikbench.robots.robot import Robot
 from dikbench.scenario import Range, Scenario
 from dikbench.scenario.oracle import solve_placement
@@ -120,13 +120,7 @@ def test_a_target_within_reach_is_refused(monkeypatch: pytest.MonkeyPatch) -> No
 
 def test_a_boundary_that_is_a_limit_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the elbow's limit comes before the stretched arm."""
-    arm = load_robot("panda")
-    position = arm.limits.position
-    assert position is not None
-    upper = position.upper.copy()
-    upper[3] = -0.6
-    narrow = arm.with_limits(position=(position.lower, upper))
-    put_robot(monkeypatch, narrow)
+    put_robot(monkeypatch, with_upper_limit("panda", 3, -0.6))
     with pytest.raises(DikbenchError, match="position margin up to there"):
         make_scenario("workspace-boundary")
 

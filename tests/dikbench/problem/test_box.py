@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from makers.problems import interval_of, limits_at_distances
+from makers.problems import interval_of, limits_at_distances, problem_at
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.problem import DikProblem
 from dikbench.problem.velocity_box import Braking, velocity_box
 from dikbench.robots.braking import viable_brake
 from dikbench.robots.catalogue import load_robot
@@ -157,7 +156,7 @@ def test_a_problem_records_what_its_box_gave_up() -> None:
     """`problem.box` leaves the number of relaxed joints in `problem.relaxed`."""
     robot = load_robot("planar3r").with_limits(velocity=2.0, acceleration=10.0)
     v_prev = np.array([3.0, 0.0, -3.0])
-    problem = DikProblem(robot, robot.q0, v_prev, 0.01, [], robot.limits.at(robot.q0))
+    problem = problem_at(robot, robot.q0, [], v_prev)
     assert problem.relaxed == 0
     assert problem.box().relaxed == 2
     assert problem.relaxed == 2

@@ -14,6 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from makers.problems import problem_at
 from makers.scenarios import RATE, at_step, exact, planar_scenario, raises, run_on_planar
 
 from dikbench.arrays import Array
@@ -220,7 +221,7 @@ def test_steps_that_go_nowhere_are_stuck() -> None:
 
 def _problem(v_prev: Array | None, **limits: Any) -> DikProblem:
     robot = load_robot("planar3r").with_limits(**limits)
-    return DikProblem(robot, robot.q0, v_prev, 0.01, [], robot.limits.at(robot.q0))
+    return problem_at(robot, robot.q0, [], v_prev)
 
 
 @settings(deadline=None)

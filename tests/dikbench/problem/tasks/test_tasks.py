@@ -12,10 +12,10 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from makers.problems import problem_of
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.problem import DikProblem
 from dikbench.problem.tasks import (
     CentreOfMassTask,
     DampingTask,
@@ -447,14 +447,13 @@ def test_a_problem_sorts_its_tasks_into_levels() -> None:
     """One stacked task per priority, the most important first, and that one is the primary."""
     robot = load_robot("panda")
     a, b, c = _task(2, priority=1), _task(3, priority=1), _task(4, priority=5)
-    limits = robot.limits.at(robot.q0)
-    problem = DikProblem(robot, robot.q0, None, 0.01, [a, b, c], limits)
+    problem = problem_of(a, b, c, robot=robot)
     assert [len(level.V) for level in problem.levels] == [5, 4]
     assert np.array_equal(problem.primary.V, np.concatenate([a.V, b.V]))
     assert problem.levels[1] is c
-    alone = DikProblem(robot, robot.q0, None, 0.01, [a, c], limits)
+    alone = problem_of(a, c, robot=robot)
     assert alone.primary is a
-    shuffled = DikProblem(robot, robot.q0, None, 0.01, [a, c, b], limits)
+    shuffled = problem_of(a, c, b, robot=robot)
     assert [level.priority for level in shuffled.levels] == [1, 5]
 
 
