@@ -1,4 +1,4 @@
-"""Clocks: how a reference moves on during a trial, with time or with the progress achieved."""
+"""Clocks: how a reference advances during a trial, with time or with the progress achieved."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from dikbench.scenario.scenario import Scenario
 
 ReferenceMode = Literal["time", "path"]
 
-LONGEST_PATH_RUN: Final = 5
-"""A path-indexed run ends with its path, or after this many times its nominal duration."""
+LONGEST_PATH_RUN_DURATIONS: Final = 5
+"""Nominal durations after which a path-indexed run ends, if not with its path before."""
 
 PATH_END_TOLERANCE: Final = 1e-9
-"""A path has ended when at most this share of it is left."""
+"""Remaining share of a path at which it has ended."""
 
 
 class Clock(Protocol):
-    """The nominal time of a trial, which begins at 0 and moves on at every control step.
+    """The nominal time of a trial, which begins at 0 and advances at every control step.
 
     Attributes:
         tau: nominal time on the reference [s].
-        most_steps: number of control steps after which the trial is over in any case.
+        most_steps: largest number of control steps of the trial.
     """
 
     tau: float
@@ -36,18 +36,18 @@ class Clock(Protocol):
 
     @property
     def is_over(self) -> bool:
-        """Whether the trial has come to its end."""
+        """Whether the trial has ended."""
         ...
 
     def target(self) -> tuple[Any, Any]:
-        """Placement (`pinocchio.SE3`) and body twist (`pinocchio.Motion`) of the reference."""
+        """Return placement (`pinocchio.SE3`) and body twist (`pinocchio.Motion`) of the target."""
         ...
 
-    def advance(self, wanted: Array, jacobian: Array, applied: Array) -> None:
-        """Move on after a control step.
+    def advance(self, desired: Array, jacobian: Array, applied: Array) -> None:
+        """Advance after a control step.
 
         Args:
-            wanted: desired twist V of the tracking task, (m,) [m/s; rad/s].
+            desired: twist V of the tracking task, (m,) [m/s; rad/s].
             jacobian: its Jacobian J, (m, nv).
             applied: the velocity that the plant applied, (nv,) [rad/s or m/s].
         """
@@ -55,7 +55,7 @@ class Clock(Protocol):
 
 
 class TimeClock:
-    """Moves on by one control period at every step, whatever the robot does: tau = k dt."""
+    """Advances by one control period at every step: tau = k dt."""
 
     def __init__(self, scenario: Scenario) -> None:
         self.tau = 0.0
@@ -72,29 +72,29 @@ class TimeClock:
         target: tuple[Any, Any] = self._targets[self._step]
         return target
 
-    def advance(self, wanted: Array, jacobian: Array, applied: Array) -> None:
-        """Move on by one control period (see `Clock`)."""
+    def advance(self, desired: Array, jacobian: Array, applied: Array) -> None:
+        """Advance by one control period (see `Clock`)."""
         self._step += 1
         self.tau = self._step * self._dt
 
 
 class PathClock:
-    """Waits for the robot: moves on by the share of the desired motion that was made.
+    """Waits for the robot: advances by the share of the desired motion that was achieved.
 
     tau <- tau + dt min(max(alpha, 0), 1) with alpha = <J v, V>/|V|^2 (see `progress`); where no
-    motion is desired (a dwell) it moves on by dt.
+    motion is desired (a dwell) it advances by dt.
     """
 
     def __init__(self, scenario: Scenario) -> None:
         self.tau = 0.0
-        self.most_steps = LONGEST_PATH_RUN * scenario.steps
+        self.most_steps = LONGEST_PATH_RUN_DURATIONS * scenario.steps
         self._step, self._dt, self._target = 0, scenario.dt, scenario.target
         self._duration = scenario.reference.duration
         self._weights = row_weights(scenario.rows)
 
     @property
     def is_over(self) -> bool:
-        """Whether the path has ended, or `LONGEST_PATH_RUN` durations have passed."""
+        """Whether the path or `LONGEST_PATH_RUN_DURATIONS` have ended."""
         there = self.tau >= self._duration * (1 - PATH_END_TOLERANCE)
         return there or self._step == self.most_steps
 
@@ -102,10 +102,10 @@ class PathClock:
         """See `Clock`."""
         return self._target(self.tau)
 
-    def advance(self, wanted: Array, jacobian: Array, applied: Array) -> None:
-        """Move on by the progress achieved (see `Clock`)."""
+    def advance(self, desired: Array, jacobian: Array, applied: Array) -> None:
+        """Advance by the progress achieved (see `Clock`)."""
         achieved = jacobian @ applied
-        alpha = float(progress(wanted[None], achieved[None], self._weights)[0])
+        alpha = float(progress(desired[None], achieved[None], self._weights)[0])
         share = 1.0 if np.isnan(alpha) else min(max(alpha, 0.0), 1.0)
         self._step += 1
         self.tau = min(self.tau + self._dt * share, self._duration)

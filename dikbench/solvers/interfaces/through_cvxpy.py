@@ -18,7 +18,7 @@ from dikbench.programs.quadratic_program import QuadraticProgram
 from dikbench.solvers.catalogue.back_ends import Solver
 
 # Answers are rechecked; a warning about the accuracy of each would fill the output.
-warnings.filterwarnings("ignore", module=r"cvxpy\.|dikbench\.solvers\.modelled")
+warnings.filterwarnings("ignore", module=rf"cvxpy\.|{__name__}")
 
 
 class ModelledSolver:
