@@ -1,4 +1,4 @@
-"""The command line. Heavy imports stand inside the commands."""
+"""The command line; slow imports are inside the commands."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SUBJECTS = ("formulations", "scenarios", "solvers", "robots", "metrics", "studie
 
 
 def main() -> None:
-    """Run the command line; a wrong option is one line as well."""
+    """Run the command line; a wrong option gives one line."""
     try:
         sys.exit(commands.main(prog_name="dikbench", standalone_mode=False))
     except click.exceptions.NoArgsIsHelpError as error:
@@ -37,7 +37,7 @@ def main() -> None:
 def commands() -> None:
     """Compare formulations of differential inverse kinematics in closed loop, on real robot models.
 
-    A selector is a name, with parameters where wanted: 'dls[damping=0.1]',
+    A selector is a name, with parameters if needed: 'dls[damping=0.1]',
     'near-miss[robot=ur5,miss=0.02]', 'osqp[eps_abs=1e-6]'.
     """
 
@@ -85,7 +85,7 @@ STUDY_OPTIONS = (
         "references",
         multiple=True,
         type=click.Choice(["time", "path"]),
-        help="What moves the reference on: the clock, or the progress achieved.",
+        help="What advances the reference: the clock, or the progress achieved.",
     ),
     click.option(
         "--out",
@@ -185,7 +185,7 @@ def run(
 @study_options
 @one_line_errors
 def time(study: str | None, out: Path | None, **axes: Any) -> None:
-    """Take the times of a study's cells anew, without its trials; let nothing else run.
+    """Repeat the timing pass of a study, without its trials; run nothing else meanwhile.
 
     STUDY and the options are those of `dikbench run`.
     """
@@ -206,9 +206,9 @@ def time(study: str | None, out: Path | None, **axes: Any) -> None:
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path, file_okay=False))
 @one_line_errors
 def report(folder: Path) -> None:
-    """Remake the tables, figures and report of a results folder, from what is in it.
+    """Write the tables, figures and report of a results folder again, from its contents.
 
-    A committed folder, which has trials.csv and manifest.json but no store, will do.
+    A committed folder with trials.csv and manifest.json but without the store is enough.
     """
     from dikbench.report.write import write_report
 
@@ -225,10 +225,10 @@ def report(folder: Path) -> None:
 )
 @one_line_errors
 def recompute(folder: Path, jobs: int | None) -> None:
-    """Compute all metrics of a results folder anew from its traces, without running a formulation.
+    """Compute all metrics of a results folder again from its traces, without running a formulation.
 
-    For metrics that are new, or were mended, since the run. Trials whose trace was not kept stay as
-    they are; the tables and figures are made anew by the next `dikbench run`.
+    For metrics that are new or have changed since the run. Trials without a trace keep their
+    values; `dikbench report` writes the tables and figures again.
     """
     from dikbench.run.pool import available_cores
     from dikbench.run.recompute import recompute_results
@@ -260,7 +260,7 @@ def status(folder: Path) -> None:
 @click.argument("subject", required=False, type=click.Choice(SUBJECTS))
 @one_line_errors
 def list_(subject: str | None) -> None:
-    """List what there is, a line each with its source; all of it without SUBJECT."""
+    """List formulations, scenarios, ..., a line each with its source; default: all subjects."""
     from dikbench.cli.listing import listing
 
     for name in (subject,) if subject else SUBJECTS:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dikbench.testing.contract import (
     CHECKS,
-    ROUNDING,
+    LIMIT_TOLERANCE_RAD_S,
     Check,
     assert_within,
     check_acceleration_limits,
@@ -25,7 +25,7 @@ from dikbench.testing.states import State, states
 
 __all__ = [
     "CHECKS",
-    "ROUNDING",
+    "LIMIT_TOLERANCE_RAD_S",
     "Check",
     "State",
     "assert_within",

@@ -1,4 +1,4 @@
-"""The contract that every formulation keeps, as checks for the author of a plug-in.
+"""The contract of formulations, as checks for the author of a plug-in.
 
     @pytest.mark.parametrize("check", dikbench.testing.CHECKS)
     def test_contract(check):
@@ -6,8 +6,9 @@
 
 or, without pytest, `check_formulation(MyLaw())`. A check that fails raises `AssertionError` with
 the robot, the state and what was violated. The states are the same in every run: three arms inside,
-at and outside their limits and at exact singularities, asked for no, an ordinary and a huge twist,
-with and without a posture task, acceleration limits, rows G v <= h and a motion before.
+at and outside their limits and at exact singularities, with a zero, an ordinary and a very large
+desired twist, with and without a posture task, acceleration limits, rows G v <= h and a previous
+velocity.
 """
 
 from __future__ import annotations
@@ -30,17 +31,16 @@ from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, Solver, parse_s
 from dikbench.solvers.checked_solve import make_solve
 from dikbench.testing.states import State, states
 
-ROUNDING: Final = 1e-6
-"""A limit passed by less than this [rad/s], beyond the residual of the solver, is kept."""
+LIMIT_TOLERANCE_RAD_S: Final = 1e-6
+"""Excess over a limit, beyond the residual of the solver, up to which it counts as kept."""
 
 Check = Callable[[Formulation, str | None], None]
 
 
 class _Answer(NamedTuple):
-    """What a formulation gave: a velocity, or None and what it did instead; the solver's residual.
+    """A formulation's velocity, or None and the reason, with the residual of its solver.
 
-    A formulation may solve several programs, each from what the last one gave: their residuals add
-    up.
+    A formulation may solve several programs, each from the previous result: their residuals add up.
     """
 
     velocity: Array | None
@@ -63,7 +63,7 @@ class _Asked:
                 raise DikbenchError(reason)
 
     def answer(self, problem: DikProblem) -> _Answer:
-        """Ask the formulation, with a solver that remembers nothing."""
+        """Compute the formulation's velocity with a new solver."""
         solve = make_solve(self.solver, self.program)
         try:
             answer = control_step(self.formulation, problem, solve)
@@ -79,8 +79,8 @@ class _Asked:
     def verified(self) -> Iterator[tuple[State, Array, float]]:
         """Yield every state with a verified answer: state, velocity, tolerance [rad/s].
 
-        A formulation may have no answer at some states, and a solver may be wrong at some, but not
-        at all of them.
+        A formulation may have no answer at some states, and a solver may fail at some, but not at
+        all of them.
         """
         answered = False
         why = ""
@@ -88,7 +88,7 @@ class _Asked:
             answer = self.answer(state.problem)
             if answer.velocity is not None and answer.status is Status.OK:
                 answered = True
-                yield state, answer.velocity, ROUNDING + answer.residual
+                yield state, answer.velocity, LIMIT_TOLERANCE_RAD_S + answer.residual
             else:
                 why = f"{state.label}: {answer.status.value}: {answer.message}"
         if not answered:
@@ -96,7 +96,7 @@ class _Asked:
 
 
 def check_declaration(formulation: Formulation, solver: str | None = None) -> None:
-    """Check that the formulation is a frozen dataclass and that what it declares exists."""
+    """Check that the formulation is a frozen dataclass with valid declarations."""
     name = type(formulation).__name__
     parameters = getattr(formulation, "__dataclass_params__", None)
     if isinstance(formulation, type) or not is_dataclass(formulation) or not parameters.frozen:
@@ -111,7 +111,7 @@ def check_declaration(formulation: Formulation, solver: str | None = None) -> No
 
 
 def check_raises_only_cannot_answer(formulation: Formulation, solver: str | None = None) -> None:
-    """Check that the formulation answers or raises `CannotAnswer`, and answers somewhere."""
+    """Check that the formulation answers or raises `CannotAnswer`, and answers at some state."""
     asked = _Asked(formulation, solver)
     for state in states():
         answer = asked.answer(state.problem)
@@ -142,7 +142,7 @@ def check_finite(formulation: Formulation, solver: str | None = None) -> None:
 
 
 def check_inputs_untouched(formulation: Formulation, solver: str | None = None) -> None:
-    """Check that the formulation leaves everything that it was handed as it was."""
+    """Check that the formulation does not change its inputs."""
     asked = _Asked(formulation, solver)
     for state in states():
         before = {name: np.array(value) for name, value in _inputs(state.problem).items()}
@@ -150,13 +150,13 @@ def check_inputs_untouched(formulation: Formulation, solver: str | None = None) 
         after = _inputs(state.problem)
         for name in before.keys() | after.keys():
             if name not in before or name not in after:
-                raise AssertionError(f"{state.label}: the law replaced problem.{name}")
+                raise AssertionError(f"{state.label}: the formulation replaced problem.{name}")
             if not np.array_equal(before[name], np.asarray(after[name])):
-                raise AssertionError(f"{state.label}: the law changed problem.{name}")
+                raise AssertionError(f"{state.label}: the formulation changed problem.{name}")
 
 
 def _inputs(problem: DikProblem) -> dict[str, Array | float]:
-    """List the numbers that a formulation is handed, by the name under which it finds them."""
+    """List the inputs of a formulation by their names."""
     found: dict[str, Array | float | None] = {
         "q": problem.q,
         "v_prev": problem.v_prev,
@@ -179,7 +179,7 @@ def _inputs(problem: DikProblem) -> dict[str, Array | float]:
 
 
 def check_repeatable(formulation: Formulation, solver: str | None = None) -> None:
-    """Check that the same problem gives the same velocity to the bit, whatever came in between."""
+    """Check that the same problem gives exactly the same velocity, in any order of problems."""
     _compare(_Asked(formulation, solver), _Asked(formulation, solver), "asked again")
 
 
@@ -196,7 +196,7 @@ def check_picklable(formulation: Formulation, solver: str | None = None) -> None
 
 
 def _compare(first: _Asked, second: _Asked, what: str) -> None:
-    """Ask one forwards through the states, the other backwards, with other scratch data."""
+    """Compare velocities of two, the second in reverse order with other scratch data."""
     velocities = [first.answer(state.problem).velocity for state in states()]
     for v, state in reversed([*zip(velocities, states(), strict=True)]):
         robot = state.problem.robot
@@ -280,9 +280,9 @@ def _assert_inequalities(state: State, v: Array, tolerance: float) -> None:
 
 
 def check_state(formulation: Formulation, state: State, solver: str | None = None) -> None:
-    """Check one state of your own: a velocity inside the promised limits, or `CannotAnswer`.
+    """Check one state: a velocity inside the promised limits, or `CannotAnswer`.
 
-    For property-based tests; the answer of a solver that is wrong there is not judged.
+    For property-based tests; an answer that fails the recheck is not checked.
 
     Raises:
         AssertionError: if the formulation raises, answers with a wrong shape or NaN, or breaks a
@@ -293,7 +293,7 @@ def check_state(formulation: Formulation, state: State, solver: str | None = Non
         raise AssertionError(f"{state.label}: {answer.status.value}: {answer.message}")
     if answer.velocity is not None and answer.status is Status.OK:
         for kind in promises_of(formulation):
-            assert_within(state, kind, answer.velocity, ROUNDING + answer.residual)
+            assert_within(state, kind, answer.velocity, LIMIT_TOLERANCE_RAD_S + answer.residual)
 
 
 CHECKS: Final[tuple[Check, ...]] = (

@@ -12,7 +12,7 @@ import pytest
 
 from dikbench.metrics import METRICS
 from dikbench.report.drawing import style as style_module
-from dikbench.results.columns import RATES, TIMES
+from dikbench.results.columns import CONTROL_RATES_HZ, TIMES
 from dikbench.results.selected import with_selected
 
 MakeTrials = Callable[..., pd.DataFrame]
@@ -51,7 +51,9 @@ def made_up(
     drawn = {name: random.lognormal(-4.0, 1.0, len(table)) for name in (*METRICS, *TIMES)}
     table = table.assign(**drawn | {"timing_samples": 100, "timing_stability": "stable"})
     table["progress_mean"] = table["progress_min"] = 1.0 - table["progress_mean"].clip(upper=1.0)
-    return with_selected(table.assign(**{f"missed_{rate}_hz_share": 0.0 for rate in RATES}))
+    return with_selected(
+        table.assign(**{f"missed_{rate}_hz_share": 0.0 for rate in CONTROL_RATES_HZ})
+    )
 
 
 @pytest.fixture
