@@ -12,7 +12,6 @@ from dikbench.problem import (
     Braking,
     DikProblem,
     LimitKind,
-    LinearizedJointTask,
     Parameters,
     ProgramKind,
     QuadraticProgram,
@@ -20,6 +19,7 @@ from dikbench.problem import (
     Solve,
     null_space,
 )
+from formulations.drake import posture_of
 from formulations.lp_alpha import alpha_program
 from formulations.null_space_program import limits_about
 
@@ -63,16 +63,8 @@ class AlphaTwoStage(Parameters):
         k = N.shape[1]
         if not k:
             return first
-        posture = posture_velocity(problem)
+        posture, _ = posture_of(problem)
         G, h = limits_about(first, N, box, problem)
         z = solve(QuadraticProgram(np.eye(k), N.T @ (first - posture), G, h))
         v: Array = first + N @ z
         return v
-
-
-def posture_velocity(problem: DikProblem) -> Array:
-    """Return the desired velocity of the first posture task, (nv,) [rad/s]; else zero."""
-    for task in problem.tasks:
-        if isinstance(task, LinearizedJointTask) and task.error.any():  # not one of damping
-            return task.V
-    return np.zeros(problem.robot.nv)

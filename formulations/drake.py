@@ -64,7 +64,7 @@ class Drake(Parameters):
             penalty = 2 / ALPHA_REWARD * kernel @ kernel.T
             P[:n, :n] = penalty
             if self.centering:
-                q[:n] = -penalty @ (self.centering * posture_error(problem))
+                q[:n] = -penalty @ (self.centering * posture_of(problem)[1])
         A = np.empty((m, n + 1))
         A[:, :n], A[:, n] = J, -V
         box = problem.box("one-step")
@@ -74,12 +74,12 @@ class Drake(Parameters):
         return x[:n]
 
 
-def posture_error(problem: DikProblem) -> Array:
-    """Return q_nom - q of the first posture task, (nv,) [rad]; zero where there is none."""
+def posture_of(problem: DikProblem) -> tuple[Array, Array]:
+    """Return V [rad/s] and error q_nom - q [rad] of the first posture task, (nv,), or zeros."""
     for task in problem.tasks:
         if isinstance(task, LinearizedJointTask) and task.error.any():  # not one of damping
-            return task.error
-    return np.zeros(problem.robot.nv)
+            return task.V, task.error
+    return np.zeros(problem.robot.nv), np.zeros(problem.robot.nv)
 
 
 def angular_first(J: Array) -> Array:

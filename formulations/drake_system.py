@@ -20,7 +20,7 @@ from dikbench.problem import (
     Range,
     Solve,
 )
-from formulations.drake import angular_first, posture_error
+from formulations.drake import angular_first, posture_of
 from formulations.lu_kernel import lu_kernel
 
 STOP_DISTANCE_RAD = 0.0025
@@ -68,7 +68,7 @@ class DrakeSystem(Parameters):
         if kernel.size:
             centred = kernel @ kernel.T / self.tracking_weight
             P += centred
-            q -= centred @ (self.centering * posture_error(problem))
+            q -= centred @ (self.centering * posture_of(problem)[1])
         lower, upper = scaled_bounds(problem.limits)
         return solve(QuadraticProgram(P, q, lb=lower, ub=upper))
 

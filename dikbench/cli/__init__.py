@@ -42,50 +42,37 @@ def commands() -> None:
     """
 
 
+def _axis(name: str, help: str, **settings: Any) -> Callable[..., Any]:
+    """Make the option that replaces an axis of a study; it may be repeated."""
+    return click.option(f"--{name}", f"{name}s", multiple=True, help=help, **settings)
+
+
 STUDY_OPTIONS = (
     click.argument("study", required=False),
-    click.option(
-        "--formulation",
-        "formulations",
-        multiple=True,
+    _axis(
+        "formulation",
+        "A formulation, path/to/file.py:Class, or oracle; 'dls[damping=0.01|0.1]' is two.",
         metavar="SELECTOR",
-        help="A formulation, path/to/file.py:Class, or oracle; 'dls[damping=0.01|0.1]' is two.",
     ),
-    click.option(
-        "--scenario",
-        "scenarios",
-        multiple=True,
-        metavar="SELECTOR",
-        help="A scenario; repeat for more.",
+    _axis("scenario", "A scenario; repeat for more.", metavar="SELECTOR"),
+    _axis(
+        "solver", "A solver, for formulations that need one; repeat for more.", metavar="SELECTOR"
     ),
-    click.option(
-        "--solver",
-        "solvers",
-        multiple=True,
-        metavar="SELECTOR",
-        help="A solver, for formulations that need one; repeat for more.",
-    ),
-    click.option(
-        "--seed",
-        "seeds",
-        multiple=True,
+    _axis(
+        "seed",
+        "A seed of the scenarios; 0 perturbs nothing; repeat for more.",
         type=click.IntRange(min=0),
         metavar="N",
-        help="A seed of the scenarios; 0 perturbs nothing; repeat for more.",
     ),
-    click.option(
-        "--plant",
-        "plants",
-        multiple=True,
+    _axis(
+        "plant",
+        "ideal or saturating, with noise and delay: 'ideal[noise=1e-4,delay=2]'; repeat.",
         metavar="SELECTOR",
-        help="ideal or saturating, with noise and delay: 'ideal[noise=1e-4,delay=2]'; repeat.",
     ),
-    click.option(
-        "--reference",
-        "references",
-        multiple=True,
+    _axis(
+        "reference",
+        "What advances the reference: the clock, or the progress achieved.",
         type=click.Choice(["time", "path"]),
-        help="What advances the reference: the clock, or the progress achieved.",
     ),
     click.option(
         "--out",
@@ -93,6 +80,13 @@ STUDY_OPTIONS = (
         metavar="DIR",
         help="Results folder; default: runs/STUDY.",
     ),
+)
+
+JOBS_OPTION = click.option(
+    "--jobs",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Worker processes; default: one per core.",
 )
 
 
@@ -114,12 +108,7 @@ def _selected(study: str | None, axes: dict[str, Any], out: Path | None) -> tupl
 
 @commands.command()
 @study_options
-@click.option(
-    "--jobs",
-    type=click.IntRange(min=1),
-    metavar="N",
-    help="Worker processes; default: one per core.",
-)
+@JOBS_OPTION
 @click.option(
     "--rerun",
     default="",
@@ -217,12 +206,7 @@ def report(folder: Path) -> None:
 
 @commands.command()
 @click.argument("folder", type=click.Path(path_type=Path, file_okay=False))
-@click.option(
-    "--jobs",
-    type=click.IntRange(min=1),
-    metavar="N",
-    help="Worker processes; default: one per core.",
-)
+@JOBS_OPTION
 @one_line_errors
 def recompute(folder: Path, jobs: int | None) -> None:
     """Compute all metrics of a results folder again from its traces, without running a formulation.

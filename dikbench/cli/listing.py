@@ -168,7 +168,7 @@ def _solver(name: str) -> str:
     return "\n".join(
         [
             f"{name}: {entry.summary}",
-            f"  package: {entry.distribution}, {'installed' if is_installed(name) else 'missing'}",
+            f"  package: {entry.package}, {'installed' if is_installed(name) else 'missing'}",
             f"  interfaces: {', '.join(entry.interfaces)} (the first is the default)",
             f"  linear programs: {entry.no_lp or 'yes'}",
             f"  presets: {presets} (largest residual of a verified answer)",

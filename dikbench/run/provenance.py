@@ -29,7 +29,7 @@ def environment(commit: str | None, command: str) -> dict[str, Any]:
         commit: see `git_commit`.
         command: the command line, as typed.
     """
-    solvers = {name: _version(entry.distribution) for name, entry in BACK_ENDS.items()}
+    solvers = {name: _version(entry.package) for name, entry in BACK_ENDS.items()}
     return {
         "command": command,
         "git_commit": commit,

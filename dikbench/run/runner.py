@@ -85,17 +85,21 @@ def run_study(study: Study, out: Path, settings: RunSettings, command: str) -> R
     folder = ResultsFolder(out)
     with folder.lock(), Store(folder.database) as store:
         commit = git_commit()
-        described = environment(commit, command)
-        run = store.begin_run(manifest(study, len(planned), described), planned)
-        done = store.statuses()
+        own = environment(commit, command)
+        run = store.begin_run(manifest(study, len(planned), own), planned)
+        done, positions = store.statuses(), {p.id: number for number, p in enumerate(planned)}
         todo = [p for p in planned if p.id not in done or _again(p, done[p.id], settings.rerun)]
         if len(todo) < len(planned):
             print(f"{len(planned) - len(todo)} of {len(planned)} trials are done", file=sys.stderr)
         try:
-            _run_trials(store, run, folder, todo, settings, commit, command, planned)
+            with ProgressDisplay(len(todo), "trials") as display:
+                for trial, row in run_trials(todo, folder, settings, commit, command):
+                    described = row.pop("described", None)
+                    row["environment"] = None if described is None else store.environment(described)
+                    store.record_trial({"id": trial.id, **row}, run, positions[trial.id])
+                    display.advance()
             if study.timing is not None:
-                again = settings.rerun == "all"
-                _time(store, run, study, planned, again=again)
+                _time(store, run, study, planned, again=settings.rerun == "all")
         except KeyboardInterrupt:
             finished = sum(p.id in store.statuses() for p in planned)
             folder.export(store)
@@ -150,26 +154,6 @@ def _again(planned: PlannedTrial, status: str, rerun: str) -> bool:
     if rerun == "failed":
         return status not in {Status.OK.value, Status.SKIPPED.value}
     return rerun == "all" or rerun in _names(planned.trial)
-
-
-def _run_trials(
-    store: Store,
-    run: int,
-    folder: ResultsFolder,
-    todo: Sequence[PlannedTrial],
-    settings: RunSettings,
-    commit: str | None,
-    command: str,
-    planned: Sequence[PlannedTrial],
-) -> None:
-    """Run trials in worker processes and commit each row when it is finished."""
-    positions = {p.id: number for number, p in enumerate(planned)}
-    with ProgressDisplay(len(todo), "trials") as display:
-        for trial, row in run_trials(todo, folder, settings, commit, command):
-            described = row.pop("described", None)
-            row["environment"] = None if described is None else store.environment(described)
-            store.record_trial({"id": trial.id, **row}, run, positions[trial.id])
-            display.advance()
 
 
 def run_trials(

@@ -36,12 +36,10 @@ class Claim:
     @property
     def failure(self) -> str:
         """The value and the range in which it should be."""
-        bounds = (
-            f">= {self.at_least:.4g}" if self.at_least > -float("inf") else "",
-            f"<= {self.at_most:.4g}" if self.at_most < float("inf") else "",
-        )
-        needed = " and ".join(filter(None, bounds)) or "a number"
-        return f"{self.quantity} = {self.value:.4g}, must be {needed}"
+        low = f">= {self.at_least:.4g}" if self.at_least > -float("inf") else ""
+        high = f"<= {self.at_most:.4g}" if self.at_most < float("inf") else ""
+        valid = " and ".join(filter(None, (low, high))) or "a number"
+        return f"{self.quantity} = {self.value:.4g}, must be {valid}"
 
 
 class CertificateFailed(DikbenchError):

@@ -112,33 +112,32 @@ def check_declaration(formulation: Formulation, solver: str | None = None) -> No
 
 def check_raises_only_cannot_answer(formulation: Formulation, solver: str | None = None) -> None:
     """Check that the formulation answers or raises `CannotAnswer`, and answers at some state."""
-    asked = _Asked(formulation, solver)
-    for state in states():
-        answer = asked.answer(state.problem)
-        if answer.status is Status.FORMULATION_ERROR:
-            raise AssertionError(f"{state.label}: raised {answer.message}")
-    for _ in asked.verified():
-        break
+    _check_never(Status.FORMULATION_ERROR, "raised", formulation, solver)
+    next(_Asked(formulation, solver).verified())
 
 
 def check_shape(formulation: Formulation, solver: str | None = None) -> None:
     """Check that the velocity is an array of nv floats."""
-    asked = _Asked(formulation, solver)
-    for state in states():
-        answer = asked.answer(state.problem)
-        if answer.status is Status.WRONG_SHAPE:
-            raise AssertionError(f"{state.label}: wrong shape: {answer.message}")
+    for state, answer in _check_never(Status.WRONG_SHAPE, "wrong shape:", formulation, solver):
         if answer.velocity is not None and answer.velocity.dtype != np.float64:
             raise AssertionError(f"{state.label}: expected floats, got {answer.velocity.dtype}")
 
 
 def check_finite(formulation: Formulation, solver: str | None = None) -> None:
     """Check that the velocity holds neither NaN nor infinity."""
+    _check_never(Status.NOT_FINITE, "not finite:", formulation, solver)
+
+
+def _check_never(
+    status: Status, what: str, formulation: Formulation, solver: str | None
+) -> list[tuple[State, _Answer]]:
+    """Check that no state ends with a status; return the states and their answers."""
     asked = _Asked(formulation, solver)
-    for state in states():
-        answer = asked.answer(state.problem)
-        if answer.status is Status.NOT_FINITE:
-            raise AssertionError(f"{state.label}: not finite: {answer.message}")
+    answers = [(state, asked.answer(state.problem)) for state in states()]
+    for state, answer in answers:
+        if answer.status is status:
+            raise AssertionError(f"{state.label}: {what} {answer.message}")
+    return answers
 
 
 def check_inputs_untouched(formulation: Formulation, solver: str | None = None) -> None:

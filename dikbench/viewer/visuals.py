@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-import coal
 import numpy as np
 import pinocchio as pin
 
+from dikbench.robots.collision.obstacles import capsule
 from dikbench.robots.robot import Robot
 
 GREY_RGBA: Final = (0.62, 0.66, 0.71, 1.0)
@@ -47,9 +47,8 @@ def capsules(robot: Robot) -> Any:
     for number, ((joint, end), length) in enumerate(zip(ends, lengths, strict=True)):
         if length == 0:
             continue
-        along = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), end / length)
-        placement = pin.SE3(along.matrix(), end / 2)
-        link = pin.GeometryObject(f"link{number}", joint, placement, coal.Capsule(radius, length))
+        shape, placement = capsule(np.zeros(3), end, radius)
+        link = pin.GeometryObject(f"link{number}", joint, placement, shape)
         link.meshColor = np.array(GREY_RGBA)
         geometry.addGeometryObject(link)
     return geometry

@@ -12,7 +12,8 @@ import pytest
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_scenario
 from dikbench.plugins.built_scenarios import built
-from dikbench.study.study import Selection, expand, load_study, select
+from dikbench.study.plan import expand
+from dikbench.study.study import Selection, load_study, select
 
 README = Path(__file__).parents[2] / "README.md"
 

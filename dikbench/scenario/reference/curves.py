@@ -46,13 +46,9 @@ def circle(
         turn: the frame turns about the normal of the plane by turn sin w tau [rad].
     """
     return _curve(
-        start,
+        (start, period, laps, plane, turn),
         lambda angle: radius * np.array([np.sin(angle), 1 - np.cos(angle)]),
         lambda angle: radius * np.array([np.cos(angle), np.sin(angle)]),
-        period,
-        laps,
-        plane,
-        turn,
     )
 
 
@@ -78,26 +74,19 @@ def lemniscate(
         turn: the frame turns about the normal of the plane by turn sin w tau [rad].
     """
     return _curve(
-        start,
+        (start, period, laps, plane, turn),
         lambda angle: size * np.array([np.sin(angle), np.sin(2 * angle) / 2]),
         lambda angle: size * np.array([np.cos(angle), np.cos(2 * angle)]),
-        period,
-        laps,
-        plane,
-        turn,
     )
 
 
 def _curve(
-    start: Any,
+    given: tuple[Any, float, float, Array, float],
     offset: Callable[[float], Array],
     tangent: Callable[[float], Array],
-    period: float,
-    laps: float,
-    plane: Array,
-    turn: float,
 ) -> Reference:
     """Build a curve from its offset from `start` at an angle, (2,) [m], and its derivative."""
+    start, period, laps, plane, turn = given
     first: Array = start.rotation.copy()
     origin = start.translation.copy()
     normal = np.cross(plane[:, 0], plane[:, 1])
