@@ -23,10 +23,10 @@ from dikbench.problem import (
 from formulations.drake import angular_first, posture_of
 from formulations.lu_kernel import lu_kernel
 
-STOP_DISTANCE_RAD = 0.0025
+STOP_RAD = 0.0025
 """Distance to a limit below which a joint does not move towards it."""
 
-INFLUENCE_DISTANCE_RAD = 0.1
+INFLUENCE_RAD = 0.1
 """Distance to a limit below which a joint is slowed down."""
 
 
@@ -93,8 +93,6 @@ def scaled_bounds(limits: Limits) -> tuple[Array, Array]:
         return velocity.lower, velocity.upper
     nearer = limits.to_lower < limits.to_upper
     distance = np.minimum(limits.to_lower, limits.to_upper)
-    scale = np.clip(
-        (distance - STOP_DISTANCE_RAD) / (INFLUENCE_DISTANCE_RAD - STOP_DISTANCE_RAD), 0.0, 1.0
-    )
+    scale = np.clip((distance - STOP_RAD) / (INFLUENCE_RAD - STOP_RAD), 0.0, 1.0)
     lower = np.where(nearer, scale * velocity.lower, velocity.lower)
     return lower, np.where(nearer, velocity.upper, scale * velocity.upper)

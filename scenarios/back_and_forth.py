@@ -122,7 +122,7 @@ class BackAndForth(Family):
 def _path(where: SetUp, yaw: float, pace: float) -> Reference:
     turned, target = pin.utils.rotate("z", yaw), pin.utils.rotate("x", where.roll)
     first = turned @ (where.scale * START_M)
-    displacement = turned @ (where.scale * (STOP_M - START_M))
+    offset = turned @ (where.scale * (STOP_M - START_M))
     up, forward = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
 
     def rotation(share: float) -> Array:
@@ -133,14 +133,14 @@ def _path(where: SetUp, yaw: float, pace: float) -> Reference:
 
     def placement(tau: float) -> Any:
         share = float(np.sin(tau / pace)) ** 2
-        return pin.SE3(rotation(share) @ target, first + share * displacement)
+        return pin.SE3(rotation(share) @ target, first + share * offset)
 
     def velocity(tau: float) -> Array:
         share = float(np.sin(tau / pace)) ** 2
         rate = float(np.sin(2 * tau / pace)) / pace
         inclined = rotation(share)
         # Rz(a) Rx(b) turns at a' about the vertical and at b' about its own x.
-        world = np.array([displacement, pi / 4 * (up + inclined @ forward)])
+        world = np.array([offset, pi / 4 * (up + inclined @ forward)])
         twist: Array = rate * (world @ inclined @ target).ravel()
         return twist
 

@@ -59,15 +59,12 @@ class GreedyTrap(Family):
         q0 = change.posture(robot, np.array([self.start]))
         turned = self.goal + float(pin.log3(change.rotation(robot))[2])
         assert robot.limits.velocity is not None
-        displacement = turned - q0
-        duration = (
-            pi
-            * float(displacement[0])
-            / (2 * PEAK_SPEED_SHARE * float(robot.limits.velocity.upper[0]))
-        )
+        offset = turned - q0
+        fastest = PEAK_SPEED_SHARE * float(robot.limits.velocity.upper[0])
+        duration = pi * float(offset[0]) / (2 * fastest)
 
         def long_path(tau: float) -> Array:
-            q: Array = q0 + displacement * np.sin(pi / 2 * min(tau / duration, 1.0)) ** 2
+            q: Array = q0 + offset * np.sin(pi / 2 * min(tau / duration, 1.0)) ** 2
             return q
 
         motion = joint_oracle(robot, long_path, samples(duration, self.dt))

@@ -103,9 +103,8 @@ class Hexagon(Family):
 def _path(arm: Robot, q0: Array, centre: Array, speed: float, laps: int) -> Reference:
     start = placement_of(arm, q0)
     angles = pi / 2 - pi / 3 * np.arange(6 * laps + 1)
-    corners = (
-        centre + RADIUS_M * np.stack([np.cos(angles), np.sin(angles)], axis=1) @ plane_of(arm).T
-    )
+    circle = RADIUS_M * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    corners = centre + circle @ plane_of(arm).T
     points = np.vstack([start.translation, corners])
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     times = np.concatenate([[0.0], np.cumsum(lengths) / speed])

@@ -23,11 +23,11 @@ from dikbench.scenario import (
     samples,
     target_at_rest,
 )
-from scenarios.singular_postures import PANDA_STRETCHED_ELBOW_RAD
+from scenarios.singular_postures import PANDA_STRETCHED_RAD
 
 DURATION_S = 10.0
 
-DISTANCE_RAD = 0.003
+NEAR_RAD = 0.003
 """Distance of a joint from a singularity or its limit, which noise can exceed."""
 
 
@@ -46,15 +46,12 @@ class Postures:
     joint: int
 
 
-_UR = Postures((0.3, -1.2, 1.4, -1.0, DISTANCE_RAD, 0.2), (4,), 0)
+_PANDA = (0.0, 0.3, 0.0, PANDA_STRETCHED_RAD - NEAR_RAD, 0.0, 1.6, pi / 4)
+_UR = Postures((0.3, -1.2, 1.4, -1.0, NEAR_RAD, 0.2), (4,), 0)
 
 POSTURES: Mapping[str, Postures] = MappingProxyType(
     {
-        "panda": Postures(
-            (0.0, 0.3, 0.0, PANDA_STRETCHED_ELBOW_RAD - DISTANCE_RAD, 0.0, 1.6, pi / 4),
-            (2, 3, 4),
-            5,
-        ),
+        "panda": Postures(_PANDA, (2, 3, 4), 5),
         "ur3": _UR,
         "ur5": _UR,
         "ur10": _UR,
@@ -65,7 +62,7 @@ RANGES: Mapping[str, tuple[tuple[float, float], tuple[float, float]]] = MappingP
     {
         "start": ((0.08, inf), (0.3, inf)),
         "singular": ((1e-4, 2e-3), (0.3, inf)),
-        "limit": ((0.08, inf), (0.9 * DISTANCE_RAD, 1.1 * DISTANCE_RAD)),
+        "limit": ((0.08, inf), (0.9 * NEAR_RAD, 1.1 * NEAR_RAD)),
     }
 )
 """Ranges of the smallest singular value (m, rad) and of the position margin [rad], by posture."""
@@ -120,5 +117,5 @@ class HoldStill(Family):
             if position is None:
                 raise DikbenchError(f"robot {robot.name} has no position limits")
             q0 = q0.copy()
-            q0[where.joint] = position.upper[where.joint] - DISTANCE_RAD
+            q0[where.joint] = position.upper[where.joint] - NEAR_RAD
         return q0

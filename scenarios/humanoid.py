@@ -138,10 +138,8 @@ def _measured(
         about the soles [m], which is aligned with the axes of the world.
     """
     soles = np.array([X.translation[:2] for X in _soles(body, motion.q[0])])
-    lower, upper = (
-        soles.min(axis=0) - np.array(SOLE_SIZE_M) / 2,
-        soles.max(axis=0) + np.array(SOLE_SIZE_M) / 2,
-    )
+    half = np.array(SOLE_SIZE_M) / 2
+    lower, upper = soles.min(axis=0) - half, soles.max(axis=0) + half
     kinematics, sigma, slip, room = Kinematics(body), [], [], []
     hand = len(body.task_rows)
     for q in motion.q:

@@ -41,7 +41,7 @@ class Swing:
 
     Attributes:
         joint: the joint that swings (index into v).
-        amplitude: its displacement to either side of the middle [rad].
+        amplitude: its offset to either side of the middle [rad].
         middle: posture half way [rad]; None: the robot's start.
     """
 
@@ -156,18 +156,18 @@ class ObstacleInTheWay(Family):
 
 def _swing(arm: Robot, middle: Array, swing: Swing, duration: float) -> tuple[Array, Reference]:
     """Compute the start (nq,) and the path of the task frame of a swing past the middle."""
-    displacement = np.zeros(arm.nv)
-    displacement[swing.joint] = swing.amplitude
+    offset = np.zeros(arm.nv)
+    offset[swing.joint] = swing.amplitude
 
     def q_r(tau: float) -> Array:
         u = tau / duration
         s = u**3 * (10 - 15 * u + 6 * u**2)
-        q: Array = pin.integrate(arm.model, middle, (2 * s - 1) * displacement)
+        q: Array = pin.integrate(arm.model, middle, (2 * s - 1) * offset)
         return q
 
     def v_r(tau: float) -> Array:
         u = tau / duration
-        v: Array = 60 * u**2 * (1 - u) ** 2 / duration * displacement
+        v: Array = 60 * u**2 * (1 - u) ** 2 / duration * offset
         return v
 
     return q_r(0.0), joint_path(arm, q_r, v_r, duration)
@@ -239,7 +239,7 @@ def _clear_motion(
 ) -> Array:
     """Find configurations (k + 1, nq) that follow the reference and keep clear.
 
-    The elbow turns away by as little as needed, in steps of 0.1, and returns: the displacement in
+    The elbow turns away by as little as needed, in steps of 0.1, and returns: the offset in
     the null space is proportional to sin^2(pi t/T). The last motion is returned if none is clear.
     """
     for turn in 0.1 * np.arange(1, 13):

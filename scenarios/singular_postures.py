@@ -23,7 +23,7 @@ class SingularPosture(NamedTuple):
     half_length: float
 
 
-PANDA_STRETCHED_ELBOW_RAD = -(atan(0.0825 / 0.316) + atan(0.0825 / 0.384))
+PANDA_STRETCHED_RAD = -(atan(0.0825 / 0.316) + atan(0.0825 / 0.384))
 """Angle of the Panda's elbow when stretched, from the offsets and lengths of its arm [m]."""
 
 _UR_WRIST = SingularPosture((0.3, -1.2, 1.4, -1.0, 0.0, 0.2), 0.3)
@@ -43,9 +43,7 @@ SINGULAR_POSTURES: Mapping[str, Mapping[SingularityName, SingularPosture]] = Map
         "ur5": {"wrist": _UR_WRIST, "elbow": _ur_elbow(0.15), "shoulder": _ur_shoulder(0.12)},
         "ur10": {"wrist": _UR_WRIST, "elbow": _ur_elbow(0.15), "shoulder": _ur_shoulder(0.15)},
         "panda": {
-            "elbow": SingularPosture(
-                (0.0, 0.3, 0.0, PANDA_STRETCHED_ELBOW_RAD, 0.0, 1.6, pi / 4), 0.15
-            ),
+            "elbow": SingularPosture((0.0, 0.3, 0.0, PANDA_STRETCHED_RAD, 0.0, 1.6, pi / 4), 0.15),
             "shoulder": SingularPosture((0.3, 0.0, pi / 2, -1.8, 0.0, 1.6, 0.4), 0.1),
             "wrist": SingularPosture((0.0, 0.3, 0.0, -2.0, pi / 2, 3.364, 0.4), 0.1),
         },

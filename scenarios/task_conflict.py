@@ -114,12 +114,12 @@ class TaskConflict(Family):
         """See `Family`."""
         where = CONFLICTS[self.robot]
         start = change.posture(robot, np.array(where.start))
-        displacement = np.array(where.middle) - start
+        offset = np.array(where.middle) - start
         assert robot.limits.velocity is not None
         # The rate of sin^2(pi t/T) peaks at pi/T.
-        fastest = float((np.abs(displacement) / robot.limits.velocity.upper).max())
+        fastest = float((np.abs(offset) / robot.limits.velocity.upper).max())
         duration = pi * fastest / self.speed * change.pace
-        q_r, v_r = there_and_back(robot, start, displacement, duration)
+        q_r, v_r = there_and_back(robot, start, offset, duration)
         task = PoseTask if where.whole_pose else PositionTask
         tracking: TrackingTask = task(gain=self.gain)
         kinematics = Kinematics(robot)

@@ -19,7 +19,7 @@ from dikbench.problem.tasks import PostureTask, Task, TrackingTask
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.robot import Robot
 from dikbench.scenario.certificate import Claim
-from dikbench.scenario.oracle import WHOLE_POSE, OracleMotion, oracle_motion
+from dikbench.scenario.oracle import POSE, OracleMotion, oracle_motion
 from dikbench.scenario.reference.reference import Reference
 from dikbench.scenario.steps import steps_in
 
@@ -50,7 +50,7 @@ def influence_distance(*, acceleration: bool) -> float:
 
 
 def secondary_tasks(
-    robot: Robot, posture: Array, tracking: TrackingTask = WHOLE_POSE
+    robot: Robot, posture: Array, tracking: TrackingTask = POSE
 ) -> tuple[Task, ...]:
     """Hold a posture in the null space, where the arm has one."""
     if robot.nv <= len(tracking.rows(robot)):
@@ -59,7 +59,7 @@ def secondary_tasks(
 
 
 def start_velocity(
-    robot: Robot, reference: Reference, q0: Array, tracking: TrackingTask = WHOLE_POSE
+    robot: Robot, reference: Reference, q0: Array, tracking: TrackingTask = POSE
 ) -> Array:
     """Compute the joint velocity (nv,) at the reference's beginning, scaled into the limits."""
     kinematics = Kinematics(robot)
@@ -95,9 +95,7 @@ def duration_at(robot: Robot, at_one_second: Reference, q0: Array, speed: float)
     return motion.peak_speed_ratio / speed
 
 
-def least_norm_share(
-    robot: Robot, q: Array, joint: int, tracking: TrackingTask = WHOLE_POSE
-) -> float:
+def least_norm_share(robot: Robot, q: Array, joint: int, tracking: TrackingTask = POSE) -> float:
     """Compute the smallest share of a joint in the least-norm velocity for its own effect.
 
     It is the entry (joint, joint) of J^+ J at configurations q (k, nq): 1 where no other joint
@@ -145,24 +143,22 @@ def usual_claims(
     return tuple(claims)
 
 
-def there_and_back(robot: Robot, start: Array, displacement: Array, duration: float) -> JointMotion:
-    """Build the joint motion q(t) = start + sin^2(pi t/T) displacement, with its derivative.
+def there_and_back(robot: Robot, start: Array, offset: Array, duration: float) -> JointMotion:
+    """Build the joint motion q(t) = start + sin^2(pi t/T) offset, with its derivative.
 
     Args:
         robot: the robot.
         start: configuration at both ends, (nq,).
-        displacement: from the start to the middle of the motion, (nv,) [rad or m].
+        offset: from the start to the middle of the motion, (nv,) [rad or m].
         duration: T [s].
     """
 
     def q(tau: float) -> Array:
-        moved: Array = pin.integrate(
-            robot.model, start, np.sin(pi * tau / duration) ** 2 * displacement
-        )
+        moved: Array = pin.integrate(robot.model, start, np.sin(pi * tau / duration) ** 2 * offset)
         return moved
 
     def v(tau: float) -> Array:
-        rate: Array = pi / duration * np.sin(2 * pi * tau / duration) * displacement
+        rate: Array = pi / duration * np.sin(2 * pi * tau / duration) * offset
         return rate
 
     return q, v

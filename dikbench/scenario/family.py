@@ -19,7 +19,7 @@ from dikbench.scenario.building import (
     start_velocity,
 )
 from dikbench.scenario.certificate import Certificate, Claim
-from dikbench.scenario.oracle import WHOLE_POSE, OracleMotion, oracle_motion
+from dikbench.scenario.oracle import POSE, OracleMotion, oracle_motion
 from dikbench.scenario.reference.reference import Reference
 from dikbench.scenario.scenario import Scenario, first_level
 from dikbench.scenario.variation import NO_VARIATION, Perturbation, Variation
@@ -143,7 +143,7 @@ class Family(Parameters, ABC):
         robot: Robot,
         reference: Reference,
         q0: Array,
-        tracking: TrackingTask = WHOLE_POSE,
+        tracking: TrackingTask = POSE,
         most: int = 200,
     ) -> OracleMotion:
         """Follow a reference exactly from q0 (nq,), at every control step, or `most` of them.

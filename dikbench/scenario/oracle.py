@@ -19,7 +19,7 @@ from dikbench.scenario.reference.reference import Reference
 ORACLE = "oracle"
 """The name of the formulation in rows that score this joint motion itself."""
 
-WHOLE_POSE = PoseTask()
+POSE = PoseTask()
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ def solve_placement(
     target: Any,
     seed: Array,
     *,
-    tracking: TrackingTask = WHOLE_POSE,
+    tracking: TrackingTask = POSE,
     iterations: int = 200,
 ) -> Array:
     """Find a configuration that does a tracking task, by damped Gauss-Newton from `seed`.
@@ -96,11 +96,7 @@ def solve_placement(
 
 
 def follow(
-    robot: Robot,
-    reference: Reference,
-    q0: Array,
-    instants: Array,
-    tracking: TrackingTask = WHOLE_POSE,
+    robot: Robot, reference: Reference, q0: Array, instants: Array, tracking: TrackingTask = POSE
 ) -> Array:
     """Compute configurations (k + 1, nq) that follow a reference exactly from q0 on.
 
@@ -123,11 +119,7 @@ def follow(
 
 
 def oracle_motion(
-    robot: Robot,
-    reference: Reference,
-    q0: Array,
-    instants: Array,
-    tracking: TrackingTask = WHOLE_POSE,
+    robot: Robot, reference: Reference, q0: Array, instants: Array, tracking: TrackingTask = POSE
 ) -> OracleMotion:
     """Follow a reference exactly from q0 and measure the motion (see `follow`)."""
     q = follow(robot, reference, q0, instants, tracking)
@@ -138,7 +130,7 @@ def joint_oracle(
     robot: Robot,
     configuration: Callable[[float], Array],
     instants: Array,
-    tracking: TrackingTask = WHOLE_POSE,
+    tracking: TrackingTask = POSE,
 ) -> OracleMotion:
     """Measure a joint motion that is known in closed form: tau [s] -> q (nq,)."""
     q = np.array([configuration(tau) for tau in instants])
@@ -149,7 +141,7 @@ def measure_motion(
     robot: Robot,
     instants: Array,
     q: Array,
-    tracking: TrackingTask = WHOLE_POSE,
+    tracking: TrackingTask = POSE,
     exact: Callable[[float], Array] | None = None,
 ) -> OracleMotion:
     """Measure a joint motion (k + 1, nq) at its instants (k + 1,) [s] (see `OracleMotion`)."""

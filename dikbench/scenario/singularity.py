@@ -15,7 +15,7 @@ from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.robot import Robot
 from dikbench.scenario.oracle import position_margin
 
-DIFFERENCE_STEP_RAD: Final = 1e-5
+STEP_RAD: Final = 1e-5
 """Step of central differences of the Jacobian, whose error is about its square."""
 
 ZERO_SINGULAR_VALUE: Final = 1e-10
@@ -188,10 +188,8 @@ def _jacobian_derivatives(robot: Robot, q: Array) -> Array:
     kinematics, unit = Kinematics(robot), np.eye(nv)
     derivatives = np.empty((nv, len(rows), nv))
     for k in range(nv):
-        kinematics.update(pin.integrate(robot.model, q, DIFFERENCE_STEP_RAD * unit[k]))
+        kinematics.update(pin.integrate(robot.model, q, STEP_RAD * unit[k]))
         ahead = kinematics.jacobian(robot.frame_id)[rows].copy()
-        kinematics.update(pin.integrate(robot.model, q, -DIFFERENCE_STEP_RAD * unit[k]))
-        derivatives[k] = (ahead - kinematics.jacobian(robot.frame_id)[rows]) / (
-            2 * DIFFERENCE_STEP_RAD
-        )
+        kinematics.update(pin.integrate(robot.model, q, -STEP_RAD * unit[k]))
+        derivatives[k] = (ahead - kinematics.jacobian(robot.frame_id)[rows]) / (2 * STEP_RAD)
     return derivatives

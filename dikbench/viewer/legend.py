@@ -16,10 +16,7 @@ TARGET_COLOUR: Final = 0x0072B2
 """Colour of the path of the target."""
 
 LEGEND: Final = (
-    (
-        TARGET_COLOUR,
-        "blue: path of the target, whose axes are the large ones (x red, y green, z blue)",
-    ),
+    (TARGET_COLOUR, "blue: path of the target, with the large axes (x red, y green, z blue)"),
     (COLOURS[Nearness.INSIDE], "green: path of the task frame, joints; inside all limits"),
     (COLOURS[Nearness.NEAR], f"yellow: from {100 * NEAR_SHARE:.0f} % of a position or speed limit"),
     (COLOURS[Nearness.PAST], "red: past a limit"),
