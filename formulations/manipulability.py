@@ -12,9 +12,8 @@ def manipulability_gradient(J: Array) -> Array:
 
         dw/dq_k = w tr(J^+ dJ/dq_k),   dJ_j/dq_k = [J_j, J_k] for k > j, else 0
 
-    with [a, b] the Lie bracket of two body twists (linear; angular); columns in the order of the
-    chain, one joint each. For a planar arm, whose J has three rows (x, y; yaw), likewise in the
-    plane.
+    with [a, b] the Lie bracket of two body twists (linear; angular), columns in the order of the
+    chain, one joint each; zero where w is zero. For a planar arm, J has three rows (x, y; yaw).
 
     Source: Yoshikawa (1985), Manipulability of robotic mechanisms; Haviland & Corke (2023),
     Manipulator differential kinematics, part 2.

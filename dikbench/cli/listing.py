@@ -1,4 +1,4 @@
-"""What there is, in lines and in full."""
+"""Lists of formulations, families, solvers, robots, metrics and studies, and their descriptions."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def _bracketed(source: str) -> str:
 
 def _formulations() -> list[tuple[str, str, str]]:
     formulations = plugins("formulation").values()
-    summary = "Not a law: the joint motion from which a scenario's path was built, scored like one"
+    summary = "Not a formulation: the exact joint motion of a scenario, scored like one"
     return [
         *(
             (formulation.name, formulation.summary.rstrip("."), formulation.source)
@@ -146,12 +146,12 @@ def _difficulty(text: str) -> list[str]:
     lines = [f"Certificate of {text}:", *(f"  {claim}" for claim in scenario.certificate.claims)]
     motion = scenario.motion
     if motion is None:
-        lines += ["", "No joint motion does what it asks for."]
+        lines += ["", "No joint motion follows its reference."]
     else:
         sigma, margin, reach = motion.sigma_min, motion.margin, motion.reach
         lines += [
             "",
-            f"The joint motion that does it, in {len(motion.instants)} samples "
+            f"The exact joint motion, in {len(motion.instants)} samples "
             f"({scenario.duration:.4g} s, {scenario.steps} control steps):",
             f"  smallest singular value (m, rad): {sigma.min():.4g} to {sigma.max():.4g}",
             f"  margin to the position limits [rad]: {margin.min():.4g} to {margin.max():.4g}",
@@ -168,7 +168,7 @@ def _solver(name: str) -> str:
     return "\n".join(
         [
             f"{name}: {entry.summary}",
-            f"  package: {entry.distribution}, {'installed' if is_installed(name) else 'missing'}",
+            f"  package: {entry.package}, {'installed' if is_installed(name) else 'missing'}",
             f"  interfaces: {', '.join(entry.interfaces)} (the first is the default)",
             f"  linear programs: {entry.no_lp or 'yes'}",
             f"  presets: {presets} (largest residual of a verified answer)",

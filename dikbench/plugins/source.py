@@ -1,4 +1,4 @@
-"""The source that a plug-in is made of: its own file, and what it shares with others."""
+"""The source of a plug-in: its own file and the modules that it imports from its package."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from typing import Final
 
 from dikbench.plugins.finding import Plugin
 
-SHARING: Final = ("formulations", "scenarios")
-"""Packages whose modules count wherever they are imported; those of a plug-in's own package do too.
-The harness does not: it is in the version."""
+SHARED_PACKAGES: Final = ("formulations", "scenarios")
+"""Packages whose modules belong to the source of a plug-in that imports them, like those of its own
+package. The harness does not, since its version is recorded."""
 
 
 def source_digest(plugin: Plugin) -> str:
     """Hash the source of a plug-in to 16 hexadecimal digits.
 
-    Of its own file and of the modules of its package that it imports, directly or through others:
-    laws that share a module change with it, and no other law does.
+    The source is its own file and the modules of its package that it imports, directly or
+    indirectly: plug-ins that share a module change with it, and no others do.
     """
     module = plugin.factory.__module__
-    packages = frozenset({*SHARING, module.partition(".")[0]})
+    packages = frozenset({*SHARED_PACKAGES, module.partition(".")[0]})
     files: dict[str, str] = {module: plugin.file}
     waiting = [module]
     while waiting:
@@ -54,7 +54,7 @@ def _imported(file: str, module: str, packages: frozenset[str]) -> frozenset[str
     """Find the modules of some packages that a file imports anywhere as module `module`."""
     try:
         tree = ast.parse(Path(file).read_bytes())
-    except (OSError, SyntaxError, ValueError):  # no file, or none of Python's
+    except (OSError, SyntaxError, ValueError):  # no file, or not one of Python
         return frozenset()
     found: set[str] = set()
     for node in ast.walk(tree):
@@ -65,7 +65,7 @@ def _imported(file: str, module: str, packages: frozenset[str]) -> frozenset[str
         else:
             continue
         for base, name in names:
-            if base.partition(".")[0] in packages:  # others are not looked for: that imports them
+            if base.partition(".")[0] in packages:  # looking for others would import them
                 inner = f"{base}.{name}"
                 found.add(inner if name and _file(inner) else base)
     return frozenset(found)
@@ -89,6 +89,6 @@ def _file(module: str) -> str:
         return getattr(loaded, "__file__", None) or ""
     try:
         spec = importlib.util.find_spec(module)
-    except (ImportError, AttributeError, ValueError):  # its parent is no package
+    except (ImportError, AttributeError, ValueError):  # its parent is not a package
         return ""
     return (spec.origin or "") if spec is not None and spec.has_location else ""

@@ -19,9 +19,9 @@ from dikbench.results.columns import KEYS, RENAMED, TIMED, TIMES, TRIAL
 from dikbench.study.plan import PlannedTrial
 from dikbench.study.trial import Trial
 
-SCHEMA: Final = 2
-"""Version of the tables below. A store of version 1, whose times have other names, is renamed when
-it is opened; another one is not read."""
+SCHEMA_VERSION: Final = 2
+"""Version of the tables below. Times of a store of version 1 are renamed when it is opened; other
+versions are refused."""
 
 NUMBERS: Final = (*METRICS, "wall_time_s", "control_time_s")
 
@@ -48,23 +48,23 @@ CREATE TABLE times (
   PRIMARY KEY (formulation, solver, scenario)
 );
 """
-"""A trial's `position` is its place in the plan of the last run; without one it is not part of it
-and shown after it. It is `superseded`, kept but not shown, where the plan has a trial with the same
-selectors whose formulation or scenario has another source."""
+"""A trial's `position` is its place in the plan of the last run; without one it is not part of the
+plan and shown last. It is `superseded`, kept but not shown, where the plan has a trial with the
+same selectors whose formulation or scenario has another source."""
 
 
 class OtherVersion(DikbenchError):
-    """A store that a dikbench with other tables or metrics wrote."""
+    """A store of a version with other tables or metrics."""
 
 
 @dataclass(frozen=True)
 class StoredTrial:
-    """What identifies a row.
+    """The identity of a row.
 
     Attributes:
         id: see `trial_id`.
         trial: the cell.
-        steps: number of control steps that it made.
+        steps: number of its control steps.
     """
 
     id: str
@@ -90,11 +90,13 @@ class Store:
             self._database.execute("PRAGMA synchronous = NORMAL")
             if self._database.execute("SELECT COUNT(*) FROM sqlite_master").fetchone()[0]:
                 self._check_schema(add_metrics=add_metrics)
-            else:  # a new file, or one whose run was killed before it had tables
+            else:  # a new file, or one of a run that was killed before it had tables
                 with self._transaction():
                     for statement in TABLES.split(";\n"):
                         self._database.execute(statement)
-                    self._database.execute("INSERT INTO meta VALUES ('schema', ?)", [str(SCHEMA)])
+                    self._database.execute(
+                        "INSERT INTO meta VALUES ('schema', ?)", [str(SCHEMA_VERSION)]
+                    )
                 self._database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
         self._file = path.stat()
         self._environments = {row[0] for row in self._rows("SELECT id FROM environments")}
@@ -104,7 +106,7 @@ class Store:
         return self
 
     def __exit__(self, *error: object) -> None:
-        """Close it; what was committed stays."""
+        """Close the store; committed rows are kept."""
         self._database.close()
 
     def begin_run(self, manifest: Mapping[str, Any], planned: Sequence[PlannedTrial]) -> int:
@@ -151,10 +153,10 @@ class Store:
         return {row[0] for row in self._rows("SELECT id FROM times")}
 
     def environment(self, description: Mapping[str, Any]) -> str:
-        """Keep the description of a process; the same one is kept once.
+        """Store the description of a process, each once.
 
         Returns:
-            Its name, for rows to refer to.
+            Its name, which rows refer to.
         """
         text = json.dumps(description, sort_keys=True)
         name = hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
@@ -277,7 +279,7 @@ class Store:
             self._database.execute("PRAGMA schema_version").fetchone()
         except sqlite3.DatabaseError as error:
             raise DikbenchError(
-                f"store {self.path}: not a store of dikbench ({error}); move it away to start anew"
+                f"store {self.path}: not a store of dikbench ({error}); move it away and run again"
             ) from None
 
     def _check_schema(self, *, add_metrics: bool) -> None:
@@ -286,10 +288,10 @@ class Store:
             columns = [row[1] for row in self._database.execute("PRAGMA table_info(trials)")]
         except sqlite3.DatabaseError as error:
             raise DikbenchError(f"store {self.path}: not a store of dikbench: {error}") from None
-        if found.get("schema") not in ("1", str(SCHEMA)):
+        if found.get("schema") not in ("1", str(SCHEMA_VERSION)):
             raise OtherVersion(
                 f"store {self.path}: schema version {found.get('schema')!r} is not known; this "
-                f"dikbench reads versions 1 and {SCHEMA}"
+                f"dikbench reads versions 1 and {SCHEMA_VERSION}"
             )
         missing = [name for name in NUMBERS if name not in columns]
         if missing and not add_metrics:
@@ -303,11 +305,13 @@ class Store:
             self._database.execute(f"ALTER TABLE trials ADD COLUMN {name} REAL")
 
     def _rename_times(self) -> None:
-        """Give the columns of times that version 1 wrote today's names."""
+        """Rename the columns of times of version 1."""
         with self._guarded(), self._transaction():
             for old, new in RENAMED.items():
                 self._database.execute(f"ALTER TABLE times RENAME COLUMN {old} TO {new}")
-            self._database.execute("UPDATE meta SET value = ? WHERE key = 'schema'", [str(SCHEMA)])
+            self._database.execute(
+                "UPDATE meta SET value = ? WHERE key = 'schema'", [str(SCHEMA_VERSION)]
+            )
 
     def _check_untouched(self) -> None:
         """Check that the file is still there: SQLite would write to a removed one in silence."""

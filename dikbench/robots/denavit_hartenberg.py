@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.arrays import Array
+from dikbench.robots.planar_arm import add_hinge
 
 
 def denavit_hartenberg_arm(
@@ -36,16 +37,8 @@ def denavit_hartenberg_arm(
     parent, placement = 0, pin.SE3.Identity()
     for number, (a, alpha, d) in enumerate(table, start=1):
         position, speed = position_limits[number - 1], velocity_limits[number - 1]
-        parent = model.addJoint(
-            parent,
-            pin.JointModelRZ(),
-            placement,
-            f"joint{number}",
-            np.array([100.0]),
-            np.array([speed]),
-            np.array([-position]),
-            np.array([position]),
-        )
+        limits = -position, position
+        parent = add_hinge(model, parent, placement, f"joint{number}", limits, speed)
         placement = pin.SE3(_rotation_about_x(alpha), np.array([a, 0.0, d]))
         model.appendBodyToJoint(parent, pin.Inertia.FromSphere(1.0, 0.05), placement)
     model.addFrame(pin.Frame("tool", parent, 0, placement, pin.FrameType.OP_FRAME))

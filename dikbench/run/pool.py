@@ -1,4 +1,4 @@
-"""Worker processes: one cannot hurt another, nor the driver."""
+"""Worker processes, which cannot harm each other or the driver."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ def workers(
     Args:
         count: number of processes.
         imports: modules that each imports at its start.
-        memory: what each may take beyond its start [MB], where the system can limit it; None: any.
+        memory: limit of its memory beyond that at its start [MB], if the system has limits.
     """
     before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
     main = sys.modules["__main__"]
-    # A new process would import the script that was started: without `if __name__ == "__main__"` in
-    # it, it would begin to run the study as well.
+    # A new process would import the script that was started and, without a guard
+    # `if __name__ == "__main__"` in it, run the study as well.
     sys.modules["__main__"] = ModuleType("__main__")
     os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
     pool = ProcessPool(
@@ -72,7 +72,7 @@ def available_cores() -> int:
 
 
 def end_group(process: int) -> None:
-    """End what a worker left behind."""
+    """Kill the process group of a worker."""
     if hasattr(os, "killpg"):
         try:
             os.killpg(process, signal.SIGKILL)

@@ -1,4 +1,4 @@
-"""Progress of long work: a bar on a terminal, a line now and then elsewhere."""
+"""Progress of long work: a bar on a terminal, otherwise a line from time to time."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from typing import Final, Self
 
 from tqdm import tqdm
 
-QUIET_SECONDS: Final = 5.0
-"""Off a terminal, at most one line in this time."""
+SECONDS_BETWEEN_LINES: Final = 5.0
 
 
 class ProgressDisplay:
@@ -38,7 +37,7 @@ class ProgressDisplay:
             self._bar.update()
             return
         now = time.monotonic()
-        if now - self._last >= QUIET_SECONDS or self._done == self._total:
+        if now - self._last >= SECONDS_BETWEEN_LINES or self._done == self._total:
             self._last = now
             rate = self._done / max(now - self._start, 1e-9)
             left = (self._total - self._done) / rate

@@ -24,14 +24,14 @@ from dikbench.simulation.trace import Trace
 from dikbench.solvers.checked_solve import CheckedSolve
 from dikbench.solvers.recheck.rechecked import RecheckedSteps
 
-DIVERGED_SPEED: Final = 1e6
-"""A commanded speed above this [rad/s] means that the run has diverged."""
+DIVERGED_SPEED_RAD_S: Final = 1e6
+"""Norm of a commanded velocity above which a run has diverged."""
 
 DIVERGED_ERROR: Final = 100.0
-"""A task error above this (m, rad) means that the run has diverged."""
+"""Norm of a task error (m, rad) above which a run has diverged."""
 
-ERROR_CHECK_PERIOD: Final = 16
-"""The task error is checked once in this many control steps."""
+ERROR_CHECK_PERIOD_STEPS: Final = 16
+"""Control steps between checks of the task error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,13 +39,13 @@ class Run:
     """A finished simulation.
 
     Attributes:
-        trace: what happened, up to the end.
-        status: `ok` if the run came to its end, else what ended it.
-        message: the reason, with the step at which it happened; empty for `ok`.
+        trace: the record up to the end.
+        status: `ok` if the run was completed, else the reason of its end.
+        message: the reason in words, with the step; empty for `ok`.
         kinematics_ns: time in kinematics and in posing the problems, over all steps [ns].
         formulation_ns: time in the formulation, its solver included [ns].
-        jacobians: Jacobians of the tracking task at every step, (n, m, nv), as the formulation saw
-            them.
+        jacobians: Jacobians of the tracking task at every step, (n, m, nv), as the formulation
+            had them.
     """
 
     trace: Trace
@@ -57,7 +57,7 @@ class Run:
 
 
 _Step = tuple[Array, float, Array, Array, Array, Array, Status, int]
-"""The record of a control step that was applied, its arrays read-only: q, tau, wanted, jacobian,
+"""The record of a control step that was applied, its arrays read-only: q, tau, desired, jacobian,
 commanded, applied, status, relaxed (see `Trace`)."""
 
 
@@ -73,11 +73,11 @@ def simulate(
 
     Args:
         scenario: the case.
-        formulation: the law under test.
+        formulation: the formulation under test.
         solve: its solver.
-        plant: what the formulation sees of the robot, and what becomes of a commanded velocity.
-        mode: whether the reference moves on with the clock or with the progress achieved.
-        seed: of the plant's noise.
+        plant: the measurement and the drive.
+        mode: whether the reference advances with the clock or with the progress achieved.
+        seed: seed of the plant's noise.
 
     Returns:
         The trace and how the run ended; failures of the formulation are statuses, never exceptions.
@@ -102,21 +102,23 @@ def simulate(
                 each.J.setflags(write=False)
                 each.V.setflags(write=False)
             kinematics_ns += perf_counter_ns() - start
-            # What the formulation does to the problem reaches neither the record nor the plant.
-            wanted, jacobian = task.V, task.J
+            # The formulation may change the problem, but not the record or the plant's limits.
+            desired, jacobian = task.V, task.J
             limits = problem.limits if seen is q else robot.limits.at(q)
-            if k % ERROR_CHECK_PERIOD == 0 and task.error.dot(task.error) > DIVERGED_ERROR**2:
+            if k % ERROR_CHECK_PERIOD_STEPS == 0 and task.error.dot(task.error) > DIVERGED_ERROR**2:
                 raise TrialEnded(Status.DIVERGED, f"task error above {DIVERGED_ERROR:g} m, rad")
             answer = control_step(formulation, problem, solve, k)
             formulation_ns += answer.formulation_ns
-            if answer.square > DIVERGED_SPEED**2:
-                raise TrialEnded(Status.DIVERGED, f"commanded speed above {DIVERGED_SPEED:g} rad/s")
+            if answer.square > DIVERGED_SPEED_RAD_S**2:
+                raise TrialEnded(
+                    Status.DIVERGED, f"commanded speed above {DIVERGED_SPEED_RAD_S:g} rad/s"
+                )
             v = read_only(answer.velocity)
             applied = started.apply(v, limits)
             steps.append(
-                (q, clock.tau, wanted, jacobian, v, applied, answer.status, problem.relaxed)
+                (q, clock.tau, desired, jacobian, v, applied, answer.status, problem.relaxed)
             )
-            clock.advance(wanted, jacobian, applied)
+            clock.advance(desired, jacobian, applied)
             q, v_prev = read_only(pin.integrate(model, q, applied * dt)), applied
     except TrialEnded as ended:
         status, message = ended.status, f"step {len(steps)}: {ended}"
@@ -133,11 +135,11 @@ def _recorded(
     """
     n, nv, m = len(steps), scenario.robot.nv, len(scenario.rows)
     columns = [*zip(*steps, strict=True)] or [()] * 8
-    before, taus, wanted_list, jacobian_list, commanded_list, applied, statuses, relaxed = columns
-    wanted, commanded = _joined(wanted_list, m), _joined(commanded_list, nv)
+    before, taus, desired_list, jacobian_list, commanded_list, applied, statuses, relaxed = columns
+    desired, commanded = _joined(desired_list, m), _joined(commanded_list, nv)
     jacobians = _joined(jacobian_list, m, nv)
     achieved = np.einsum("kij,kj->ki", jacobians, commanded)
-    alpha = progress(wanted, achieved, row_weights(scenario.rows))
+    alpha = progress(desired, achieved, row_weights(scenario.rows))
     status = np.array([STEP_STATUSES.index(each) for each in statuses], dtype=int)
     ok = STEP_CODE[Status.OK]
     status[(status == ok) & rechecked.lied[:n]] = STEP_CODE[Status.NOT_VERIFIED]
@@ -146,7 +148,7 @@ def _recorded(
         scenario.dt,
         _joined((*before, q), scenario.robot.nq),
         np.array([*taus, tau]),
-        wanted,
+        desired,
         commanded,
         _joined(applied, nv),
         status,

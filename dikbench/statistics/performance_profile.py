@@ -6,7 +6,7 @@ limit for large tau how often it solves a problem at all.
 
 The best is taken over the formulations at hand, so that the order of two formulations can flip when
 a third is taken out (Gould & Scott 2016): profiles of all formulations rank the first one only.
-Profiles of two formulations alone stand beside them.
+Profiles of pairs of formulations are given in addition.
 
 Source: Dolan & Moré 2002, Benchmarking optimization software with performance profiles; Gould &
 Scott 2016, A note on performance profiles for benchmarking software.
@@ -22,8 +22,7 @@ from dikbench.arrays import Array
 def performance_ratios(costs: Array) -> Array:
     """Compute r_ps, (problems, formulations), infinite where a problem was not solved.
 
-    Problems that no formulation solved stay, with infinite ratios: every profile ends below 1 by
-        them.
+    Problems that no formulation solved keep infinite ratios, so that every profile ends below 1.
 
     Args:
         costs: t_ps > 0 (raise to a floor below which costs count as equal); infinite or NaN where

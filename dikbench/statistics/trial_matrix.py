@@ -15,13 +15,13 @@ CONTENDER = ["formulation", "solver"]
 
 @dataclass(frozen=True, eq=False)
 class TrialMatrix:
-    """Where each trial stands in matrices of cases x formulations.
+    """The place of each trial in matrices of cases x formulations.
 
     Attributes:
-        cases: a row per case: scenario and those of plant, reference and seed there are.
-        formulations: a row per formulation: formulation and solver.
-        row: of each trial, (n,).
-        column: of each trial, (n,).
+        cases: a row per case: scenario and, if there, plant, reference and seed.
+        contenders: a row per formulation and solver.
+        row: row of each trial, (n,).
+        column: column of each trial, (n,).
     """
 
     cases: pd.DataFrame

@@ -1,4 +1,4 @@
-"""What a trial is made of, as a hash: the same trial has the same id in any process, on any day."""
+"""Ids of trials: hashes of everything that a trial consists of."""
 
 from __future__ import annotations
 
@@ -20,10 +20,9 @@ from dikbench.study.trial import NO_SOLVER, Trial
 def trial_id(trial: Trial) -> str:
     """Return the id of a trial, 16 hexadecimal digits.
 
-    Made of the formulation and its parameters, the scenario family and its parameters, both with
-    the version of their source (see `source_digest`); the solver, how it is called and its
-    settings; plant, reference mode and seed. Selectors that mean the same (a default that is spelt
-    out) give the same id.
+    It is a hash of the formulation and the scenario family with their parameters and sources (see
+    `source_digest`), the solver with its interface and settings, the plant, the reference mode and
+    the seed. Selectors with the same meaning, such as an explicit default, give the same id.
 
     Raises:
         DikbenchError: if a selector does not name anything valid.

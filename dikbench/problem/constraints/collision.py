@@ -188,8 +188,8 @@ def _pairs(constraint: CollisionConstraint, robot: Robot) -> CollisionPairs:
     )
     if not len(pairs):
         raise DikbenchError(
-            f"robot {robot.name}: the collision constraint has no obstacles and no pairs of "
-            "bodies that could touch; expected at least one"
+            f"robot {robot.name}: a collision constraint without obstacles and without pairs of "
+            "bodies that could touch"
         )
     return pairs
 

@@ -1,4 +1,4 @@
-"""Reference motions: where the task frame should be at every nominal instant."""
+"""Reference motions: the desired placement of the task frame at every nominal time."""
 
 from __future__ import annotations
 
@@ -22,13 +22,12 @@ class Reference:
     A time-indexed run has tau = t; a path-indexed one advances tau by the progress achieved.
 
     Attributes:
-        duration: nominal time from end to end [s]; a target at rest has no path and is held as
-            long as the scenario lasts.
+        duration: nominal time from end to end [s]; a target at rest has no path and is held until
+            the end of the scenario.
         placement: tau -> placement X_d in the world (`pinocchio.SE3`).
         velocity: tau -> body twist V_d at nominal speed, (6,) [m/s; rad/s], in the axes of X_d.
         moving: whether there is a path at all.
-        period: nominal time of a lap, after which everything comes again [s]; infinite where
-            nothing does.
+        period: nominal time of a lap, after which the motion repeats [s]; infinite if it does not.
         first_lap: nominal time at which the first lap begins [s].
     """
 
