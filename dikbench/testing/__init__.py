@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from dikbench.testing.asked import ROUNDING, Asked
+from dikbench.testing.asked import LIMIT_TOLERANCE_RAD_S, Asked
 from dikbench.testing.contract import (
     CHECKS,
     Check,
@@ -41,7 +41,7 @@ from dikbench.testing.states import State, states
 __all__ = [
     "CHECKS",
     "FAMILY_CHECKS",
-    "ROUNDING",
+    "LIMIT_TOLERANCE_RAD_S",
     "Asked",
     "Check",
     "FamilyCheck",

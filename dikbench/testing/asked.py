@@ -15,7 +15,7 @@ from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, Solver, parse_s
 from dikbench.solvers.checked_solve import make_solve
 from dikbench.testing.states import State, states
 
-ROUNDING: Final = 1e-6
+LIMIT_TOLERANCE_RAD_S: Final = 1e-6
 """A limit passed by less than this [rad/s], beyond the residual of the solver, is kept."""
 
 
@@ -80,7 +80,7 @@ class Asked:
         for state, answer in self.answers:
             if answer.velocity is not None and answer.status is Status.OK:
                 answered = True
-                yield state, answer.velocity, ROUNDING + answer.residual
+                yield state, answer.velocity, LIMIT_TOLERANCE_RAD_S + answer.residual
             else:
                 why = f"{state.label}: {answer.status.value}: {answer.message}"
         if not answered:

@@ -1,4 +1,4 @@
-"""The contract that every formulation keeps, as checks for the author of a plug-in.
+"""The contract of formulations, as checks for the author of a plug-in.
 
     @pytest.mark.parametrize("check", dikbench.testing.CHECKS)
     def test_contract(check):
@@ -6,8 +6,9 @@
 
 or, without pytest, `check_formulation(MyLaw())`. A check that fails raises `AssertionError` with
 the robot, the state and what was violated. The states are the same in every run: three arms inside,
-at and outside their limits and at exact singularities, asked for no, an ordinary and a huge twist,
-with and without a posture task, acceleration limits, rows G v <= h and a motion before.
+at and outside their limits and at exact singularities, with a zero, an ordinary and a very large
+desired twist, with and without a posture task, acceleration limits, rows G v <= h and a previous
+velocity.
 """
 
 from __future__ import annotations
@@ -22,9 +23,9 @@ import pinocchio as pin
 
 from dikbench.arrays import Array
 from dikbench.problem.problem import DikProblem, Formulation, LimitKind, program_of, promises_of
-from dikbench.programs.quadratic_program import Program
+from dikbench.programs.quadratic_program import ProgramKind
 from dikbench.simulation.status import Status
-from dikbench.testing.asked import ROUNDING, Asked, asked_of
+from dikbench.testing.asked import LIMIT_TOLERANCE_RAD_S, Asked, asked_of
 from dikbench.testing.states import State, states
 
 Check = Callable[[Formulation | Asked, str | None], None]
@@ -37,8 +38,8 @@ def check_declaration(formulation: Formulation | Asked, solver: str | None = Non
     parameters = getattr(formulation, "__dataclass_params__", None)
     if isinstance(formulation, type) or not is_dataclass(formulation) or not parameters.frozen:
         raise AssertionError(f"{name} is not an instance of a class with @dataclass(frozen=True)")
-    if program_of(formulation) not in {None, *get_args(Program)}:
-        valid = ", ".join(get_args(Program))
+    if program_of(formulation) not in {None, *get_args(ProgramKind)}:
+        valid = ", ".join(get_args(ProgramKind))
         raise AssertionError(f"{name}.program is {program_of(formulation)!r}; valid: None, {valid}")
     wrong = promises_of(formulation) - set(get_args(LimitKind))
     if wrong:
@@ -85,13 +86,13 @@ def check_inputs_untouched(formulation: Formulation | Asked, solver: str | None 
         after = _inputs(state.problem)
         for name in before.keys() | after.keys():
             if name not in before or name not in after:
-                raise AssertionError(f"{state.label}: the law replaced problem.{name}")
+                raise AssertionError(f"{state.label}: the formulation replaced problem.{name}")
             if not np.array_equal(before[name], np.asarray(after[name])):
-                raise AssertionError(f"{state.label}: the law changed problem.{name}")
+                raise AssertionError(f"{state.label}: the formulation changed problem.{name}")
 
 
 def _inputs(problem: DikProblem) -> dict[str, Array | float]:
-    """List the numbers that a formulation is handed, by the name under which it finds them."""
+    """List the inputs of a formulation by their names."""
     found: dict[str, Array | float | None] = {
         "q": problem.q,
         "v_prev": problem.v_prev,
@@ -218,9 +219,9 @@ def _assert_inequalities(state: State, v: Array, tolerance: float) -> None:
 
 
 def check_state(formulation: Formulation, state: State, solver: str | None = None) -> None:
-    """Check one state of your own: a velocity inside the promised limits, or `CannotAnswer`.
+    """Check one state: a velocity inside the promised limits, or `CannotAnswer`.
 
-    For property-based tests; the answer of a solver that is wrong there is not judged.
+    For property-based tests; an answer that fails the recheck is not checked.
 
     Raises:
         AssertionError: if the formulation raises, answers with a wrong shape or NaN, or breaks a
@@ -231,7 +232,7 @@ def check_state(formulation: Formulation, state: State, solver: str | None = Non
         raise AssertionError(f"{state.label}: {answer.status.value}: {answer.message}")
     if answer.velocity is not None and answer.status is Status.OK:
         for kind in promises_of(formulation):
-            assert_within(state, kind, answer.velocity, ROUNDING + answer.residual)
+            assert_within(state, kind, answer.velocity, LIMIT_TOLERANCE_RAD_S + answer.residual)
 
 
 CHECKS: Final[tuple[Check, ...]] = (

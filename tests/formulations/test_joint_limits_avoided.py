@@ -17,12 +17,13 @@ from dikbench import DikProblem, LinearizedTask, PostureTask, Robot, load_robot
 from dikbench.arrays import Array
 from dikbench.plugins.building import make_formulation
 from dikbench.problem.tasks import PositionTask
-from dikbench.problem.tasks.posture import middle_posture
 from dikbench.robots.kinematics import Kinematics, smallest_singular_value
 from dikbench.robots.limits import Limits
 from formulations.weighted_least_norm import mobility
 
 PANDA = load_robot("panda")
+assert PANDA.limits.middle is not None
+MIDDLE = PANDA.limits.middle
 
 
 def steps(robot: Robot, count: int = 30) -> Iterator[tuple[DikProblem, np.random.Generator]]:
@@ -48,7 +49,7 @@ def test_centring_is_strict_priority_above_the_middle_posture() -> None:
     kinematics = Kinematics(PANDA)
     for problem, _ in steps(PANDA):
         kinematics.update(problem.q)
-        posture = PostureTask(middle_posture(PANDA), gain=3.0).linearize(kinematics)
+        posture = PostureTask(MIDDLE, gain=3.0).linearize(kinematics)
         centred = velocity_of("joint-centering[gain=3]", problem)
         both = msgspec.structs.replace(problem, tasks=[posture, *problem.tasks])
         np.testing.assert_allclose(centred, velocity_of("nullspace", both), atol=1e-10)
@@ -58,12 +59,11 @@ def test_centring_is_strict_priority_above_the_middle_posture() -> None:
 @pytest.mark.parametrize("projector", ["exact", "damped"])
 def test_damped_centring_in_closed_form(projector: str) -> None:
     """With damping, the hand goes as in `dls`, plus what the damped "projector" lets through."""
-    middle = middle_posture(PANDA)
     for problem, _ in steps(PANDA):
         J, V = problem.tasks[0].J, problem.tasks[0].V
         inverse = J.T @ np.linalg.inv(J @ J.T + 0.01 * np.eye(6))
         free = np.eye(7) - (inverse if projector == "damped" else np.linalg.pinv(J)) @ J
-        expected = inverse @ V + free @ (2.0 * (middle - problem.q))
+        expected = inverse @ V + free @ (2.0 * (MIDDLE - problem.q))
         v = velocity_of(f"joint-centering[gain=2,damping=0.1,projector={projector}]", problem)
         np.testing.assert_allclose(v, expected, atol=1e-10)
 
@@ -81,14 +81,14 @@ def test_centring_with_gain_zero_is_damped_least_squares(projector: str) -> None
 
 def test_centring_moves_joints_inwards_under_a_hand_at_rest() -> None:
     """Asked to hold still, the joints approach their middle while the hand stays where it is."""
-    kinematics, middle = Kinematics(PANDA), middle_posture(PANDA)
+    kinematics = Kinematics(PANDA)
     q = np.array([0.9, -0.8, -0.9, -2.2, 0.9, 1.8, 0.8])
     kinematics.update(q)
     target, distances = kinematics.placement(PANDA.frame_id).copy(), []
     for _ in range(300):
         kinematics.update(q)
         task = LinearizedTask(kinematics.jacobian(PANDA.frame_id), np.zeros(6), np.zeros(6))
-        distances.append(float(np.linalg.norm(q - middle)))
+        distances.append(float(np.linalg.norm(q - MIDDLE)))
         q = q + 0.001 * velocity_of("joint-centering[gain=2]", problem_at(PANDA, q, [task]))
     drift = pin.log6(target.actInv(kinematics.placement(PANDA.frame_id))).np
     assert np.all(np.diff(distances) < 0)
@@ -196,9 +196,8 @@ def test_weighted_norm_is_the_least() -> None:
 
 def test_no_joint_on_its_way_out_leaves_the_pseudo_inverse() -> None:
     """With every joint on its way in, at rest, or its motion unknown it is the pseudo-inverse."""
-    middle = middle_posture(PANDA)
     for problem, _ in steps(PANDA):
-        for v_prev in (middle - problem.q, np.zeros(7), None):
+        for v_prev in (MIDDLE - problem.q, np.zeros(7), None):
             problem.v_prev = v_prev
             np.testing.assert_allclose(
                 velocity_of("weighted-least-norm", problem),

@@ -113,7 +113,7 @@ def test_a_slow_sweep_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_tenth_of_the_size_is_refused(robot: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A path that is no sweep any more: only the rotation is left of it."""
     module = sys.modules["scenarios.back_and_forth"]
-    monkeypatch.setattr(module, "STOP", module.START + 0.1 * (module.STOP - module.START))
+    monkeypatch.setattr(module, "STOP_M", module.START_M + 0.1 * (module.STOP_M - module.START_M))
     with pytest.raises(DikbenchError, match="sweep from end to end"):
         make_scenario(f"back-and-forth[robot={robot}]")
 

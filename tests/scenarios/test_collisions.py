@@ -174,7 +174,7 @@ def test_an_obstacle_that_is_met_at_once_does_not_certify(monkeypatch: pytest.Mo
     module = sys.modules["scenarios.obstacle"]
     short = {"hand": {"panda": replace(module.SWINGS["hand"]["panda"], amplitude=0.05)}}
     monkeypatch.setattr(module, "SWINGS", short)
-    with pytest.raises(DikbenchError, match=r"distance at the start .* is false"):
+    with pytest.raises(DikbenchError, match=r"distance at the start .*, must be"):
         make_scenario("obstacle")
 
 
@@ -183,7 +183,7 @@ def test_an_elbow_that_cannot_turn_away_does_not_certify(monkeypatch: pytest.Mon
     module = sys.modules["scenarios.obstacle"]
     turned = module._turned
     monkeypatch.setattr(module, "_turned", lambda *given: turned(*given[:-1], 0.0))
-    with pytest.raises(DikbenchError, match=r"another motion that does it .* is false"):
+    with pytest.raises(DikbenchError, match=r"another motion that does it .*, must be"):
         make_scenario("obstacle[where=elbow]")
 
 

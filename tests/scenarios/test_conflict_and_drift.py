@@ -79,7 +79,7 @@ def test_tasks_that_agree_do_not_certify(monkeypatch: pytest.MonkeyPatch) -> Non
         {"planar4r": replace(CONFLICTS["planar4r"], middle=(0.5, 0.6, 0.5, 1.2))}
     )
     monkeypatch.setattr(module, "CONFLICTS", blunt)
-    with pytest.raises(DikbenchError, match=r"J_2 N_1 half way .* is false"):
+    with pytest.raises(DikbenchError, match=r"J_2 N_1 half way .*, must be"):
         make_scenario("task-conflict[robot=planar4r]")
 
 

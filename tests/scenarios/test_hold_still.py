@@ -89,7 +89,7 @@ def test_postures_that_are_not_near_are_refused(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(module, "POSTURES", MappingProxyType({"ur5": bent}))
     with pytest.raises(DikbenchError, match="smallest singular value"):
         make_scenario("hold-still[robot=ur5,posture=singular]")
-    monkeypatch.setattr(module, "NEAR", 0.5)
+    monkeypatch.setattr(module, "NEAR_RAD", 0.5)
     with pytest.raises(DikbenchError, match="position margin"):
         make_scenario("hold-still[robot=ur5,posture=limit]")
     put_robot(monkeypatch, load_robot("ur5").with_limits(position=None))

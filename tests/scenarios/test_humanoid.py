@@ -24,7 +24,7 @@ from dikbench.simulation.closed_loop import simulate
 from dikbench.simulation.status import Status
 from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, parse_solver
 from dikbench.solvers.checked_solve import make_solve
-from scenarios.humanoid import FEET
+from scenarios.humanoid import FEET_FRAMES
 
 
 @cache
@@ -54,7 +54,7 @@ def slip(scenario: Scenario, q: Array) -> float:
     """The farthest that a foot is from where it was at the start: way and angle (m, rad)."""
     return max(
         float(np.abs(pin.log6(X.actInv(feet[0])).np).max())
-        for feet in (placements(scenario, foot, q) for foot in FEET)
+        for feet in (placements(scenario, foot, q) for foot in FEET_FRAMES)
         for X in feet
     )
 
@@ -82,7 +82,7 @@ def test_robot_is_talos_in_full() -> None:
     assert np.all(np.isfinite(velocity.upper[6:]))
     # The soles are on the ground, and level but for the 2 mrad that the posture's ankles have.
     scenario = standing()
-    for foot in FEET:
+    for foot in FEET_FRAMES:
         (X,) = placements(scenario, foot, robot.q0[None])
         assert X.translation[2] == pytest.approx(0.0, abs=1e-4)
         assert np.linalg.norm(pin.log3(X.rotation)) < 2e-3
@@ -168,14 +168,14 @@ def test_motion_that_leaves_the_ground_does_not_certify(monkeypatch: pytest.Monk
     compute = module.oracle_motion
     for place in (module, sys.modules["dikbench.scenario.family"]):
         monkeypatch.setattr(place, "oracle_motion", lambda *given: compute(*given[:4], PoseTask()))
-    with pytest.raises(DikbenchError, match=r"way that the feet move .* is false"):
+    with pytest.raises(DikbenchError, match=r"way that the feet move .*, must be"):
         make_scenario("humanoid[speed=0.5]")
 
 
 def test_robot_that_would_fall_does_not_certify(monkeypatch: pytest.MonkeyPatch) -> None:
     """On feet of half the length the centre of mass is too near to their edge."""
-    monkeypatch.setattr(sys.modules["scenarios.humanoid"], "SOLE", (0.07, 0.122))
-    with pytest.raises(DikbenchError, match=r"centre of mass above the feet .* is false"):
+    monkeypatch.setattr(sys.modules["scenarios.humanoid"], "SOLE_SIZE_M", (0.07, 0.122))
+    with pytest.raises(DikbenchError, match=r"centre of mass above the feet .*, must be"):
         make_scenario("humanoid")
 
 

@@ -99,7 +99,7 @@ def test_lighter_payload_or_slower_lift_does_not_certify(
             patch.setattr(module, name, lambda *given, c=compute, f=factor: f * c(*given))
             if name == "_heaviest":  # in the time that suits the whole mass
                 patch.setattr(module, "_shortest", lambda *given: 0.4)
-            with pytest.raises(DikbenchError, match=r"torque of the motion over limit .* is false"):
+            with pytest.raises(DikbenchError, match=r"torque of the motion over limit .*, must be"):
                 make_scenario(f"torque-limited[robot={robot}]")
 
 
@@ -108,7 +108,7 @@ def test_payload_of_another_mass_does_not_certify(monkeypatch: pytest.MonkeyPatc
     module = sys.modules["scenarios.torque_limited"]
     compute = module._heaviest
     monkeypatch.setattr(module, "_heaviest", lambda *given: 1.1 * compute(*given))
-    with pytest.raises(DikbenchError, match=r"torque to hold it over limit .* is false"):
+    with pytest.raises(DikbenchError, match=r"torque to hold it over limit .*, must be"):
         make_scenario("torque-limited")
 
 

@@ -12,7 +12,8 @@ from makers.problems import interval_of, limits_at_distances, problem_at
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.problem.velocity_box import Braking, velocity_box, viable_brake
+from dikbench.problem.velocity_box import Braking, velocity_box
+from dikbench.robots.braking import viable_brake
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.limits import JointLimits
 

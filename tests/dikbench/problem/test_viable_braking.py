@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from makers.problems import limits_at_distances
 
 from dikbench.arrays import Array
-from dikbench.problem.velocity_box import Braking, sqrt_brake, velocity_box, viable_brake
+from dikbench.problem.velocity_box import Braking, velocity_box
+from dikbench.robots.braking import sqrt_brake, viable_brake
 
 periods = st.floats(5e-4, 0.05)
 accelerations = st.floats(0.5, 50.0)

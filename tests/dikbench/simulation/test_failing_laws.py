@@ -21,10 +21,10 @@ from dikbench.arrays import Array
 from dikbench.errors import Infeasible, SolverFailed
 from dikbench.problem import DikProblem, Solve
 from dikbench.programs.answer import Answer
-from dikbench.programs.quadratic_program import Program, QuadraticProgram
+from dikbench.programs.quadratic_program import ProgramKind, QuadraticProgram
 from dikbench.robots.catalogue import load_robot
 from dikbench.scenario.reference.reference import target_at_rest
-from dikbench.simulation.closed_loop import ERROR_CHECK_PERIOD
+from dikbench.simulation.closed_loop import ERROR_CHECK_PERIOD_STEPS
 from dikbench.simulation.control_step import fallback
 from dikbench.simulation.status import STEP_CODE, Status
 from dikbench.solvers.catalogue.back_ends import parse_solver
@@ -89,7 +89,8 @@ def test_a_motion_without_bounds_is_ended() -> None:
 
 
 @pytest.mark.parametrize(
-    "jump", [1, ERROR_CHECK_PERIOD - 1, ERROR_CHECK_PERIOD, ERROR_CHECK_PERIOD + 1]
+    "jump",
+    [1, ERROR_CHECK_PERIOD_STEPS - 1, ERROR_CHECK_PERIOD_STEPS, ERROR_CHECK_PERIOD_STEPS + 1],
 )
 def test_a_target_that_runs_away_ends_a_run_at_the_next_look(jump: int) -> None:
     """The task error is looked at in one step out of so many, and then ends the run."""
@@ -103,7 +104,11 @@ def test_a_target_that_runs_away_ends_a_run_at_the_next_look(jump: int) -> None:
 
     reference = replace(scenario.reference, placement=placement)
     run = run_on_planar(lambda problem: np.zeros(3), replace(scenario, reference=reference))
-    step = ERROR_CHECK_PERIOD if jump <= ERROR_CHECK_PERIOD else 2 * ERROR_CHECK_PERIOD
+    step = (
+        ERROR_CHECK_PERIOD_STEPS
+        if jump <= ERROR_CHECK_PERIOD_STEPS
+        else 2 * ERROR_CHECK_PERIOD_STEPS
+    )
     if step < 30:
         assert run.status is Status.DIVERGED
         assert run.message == f"step {step}: task error above 100 m, rad"
@@ -148,7 +153,7 @@ def test_a_law_that_solves_without_saying_so_is_told() -> None:
 class _Projection:
     """The velocity nearest to the exact one inside the limits, as a quadratic program."""
 
-    program: ClassVar[Program] = "qp"
+    program: ClassVar[ProgramKind] = "qp"
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
@@ -188,7 +193,7 @@ def test_a_lying_solver_is_caught_and_its_answer_applied() -> None:
 class _Impossible:
     """x = 0 and x = 1, always."""
 
-    program: ClassVar[Program] = "qp"
+    program: ClassVar[ProgramKind] = "qp"
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

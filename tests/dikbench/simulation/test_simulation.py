@@ -22,7 +22,7 @@ from dikbench.problem import DikProblem
 from dikbench.problem.tasks import PostureTask
 from dikbench.scenario import Scenario
 from dikbench.scenario.plant import Ideal, Saturating
-from dikbench.simulation.clock import LONGEST_PATH_RUN
+from dikbench.simulation.clock import LONGEST_PATH_RUN_DURATIONS
 from dikbench.simulation.closed_loop import Run, simulate
 from dikbench.simulation.status import STEP_CODE, Status
 from dikbench.simulation.trace import Trace
@@ -89,7 +89,7 @@ def test_a_path_indexed_reference_does_not_run_ahead_or_back() -> None:
 def test_a_path_indexed_run_gives_up_after_five_times_its_duration() -> None:
     """A law that stands still is not waited for for ever; the trial is ok, its steps are stuck."""
     run = run_on_planar(lambda problem: np.zeros(3), mode="path")
-    assert LONGEST_PATH_RUN == 5
+    assert LONGEST_PATH_RUN_DURATIONS == 5
     assert run.status is Status.OK
     assert run.trace.steps == 150
     assert np.all(run.trace.tau == 0)

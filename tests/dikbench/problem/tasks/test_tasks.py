@@ -26,7 +26,6 @@ from dikbench.problem.tasks import (
     PostureTask,
     Task,
 )
-from dikbench.problem.tasks.posture import middle_posture
 from dikbench.problem.tasks.task import stacked
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
@@ -461,29 +460,12 @@ def test_a_problem_sorts_its_tasks_into_levels() -> None:
 # --- joint centring
 
 
-def test_middle_posture_is_the_middle_of_the_limits() -> None:
-    """Half way between lower and upper, as far from both."""
-    robot = load_robot("planar3r").with_limits(position=([-1, -2, 0], [3, 1, 0.5]))
-    assert middle_posture(robot) == pytest.approx([1.0, -0.5, 0.25])
+def test_the_middle_is_half_way_between_the_limits() -> None:
+    """As far from the lower as from the upper limit, NaN for a joint that lacks one."""
+    robot = load_robot("planar3r").with_limits(position=([-1, -2, 0], [3, 1, np.inf]))
+    np.testing.assert_array_equal(robot.limits.middle, [1.0, -0.5, np.nan])
     panda = load_robot("panda")
-    seen = panda.limits.at(middle_posture(panda))
+    assert panda.limits.middle is not None
+    seen = panda.limits.at(panda.limits.middle)
     assert seen.to_lower == pytest.approx(seen.to_upper)
-
-
-def test_middle_posture_needs_limits_on_every_joint() -> None:
-    """Without them there is no middle: an error that names the robot."""
-    for robot in (
-        load_robot("panda").with_limits(position=None),
-        load_robot("panda").with_limits(position=[1, 1, 1, np.inf, 1, 1, 1]),
-        _kinova(),
-    ):
-        with pytest.raises(DikbenchError, match=f"robot {robot.name}: not every joint"):
-            middle_posture(robot)
-
-
-def test_middle_posture_leaves_the_robots_start() -> None:
-    """The start is not overwritten."""
-    robot = load_robot("panda")
-    start = robot.q0.copy()
-    middle_posture(robot)
-    assert np.array_equal(robot.q0, start)
+    assert panda.with_limits(position=None).limits.middle is None

@@ -98,16 +98,26 @@ def test_the_parameters_that_an_instance_has_need_not_be_given(
     assert make_formulation("ready") == law
 
 
-def test_a_table_may_hold_partial_calls(install: Install) -> None:
-    """functools.partial sets parameters of a family or a class as one would expect."""
-    install("dikbench.scenarios", theirs={"ur5-reach": partial(Reach, robot="ur5", dt=0.05)})
-    scenario = make_scenario("ur5-reach[dt=0.02]", seed=1)
-    assert (scenario.robot.name, scenario.dt) == ("ur5", 0.02)
-    assert make_scenario("ur5-reach").dt == 0.05
-    assert scenario_plugin("ur5-reach").summary == plugins("scenario")["ur5-reach"].summary != ""
-    install("dikbench.formulations", theirs=_laws(soft=partial(DampedLeastSquares, damping=0.2)))
+def test_a_table_may_hold_a_family_with_its_parameters_set(install: Install) -> None:
+    """As an instance or as a partial call; a selector still replaces what is set."""
+    for entry in (Reach(robot="ur5", dt=0.05), partial(Reach, robot="ur5", dt=0.05)):
+        install("dikbench.scenarios", theirs={"ur5-reach": entry})
+        scenario = make_scenario("ur5-reach[dt=0.02]", seed=1)
+        assert (scenario.robot.name, scenario.dt) == ("ur5", 0.02)
+        assert make_scenario("ur5-reach").dt == 0.05
+        assert scenario_plugin("ur5-reach").parameters["robot"].default == "ur5"
+        assert scenario_plugin("ur5-reach").summary.startswith("A step to a target nearby")
+
+
+@pytest.mark.parametrize(
+    "entry", [partial(DampedLeastSquares, damping=0.2), partial(DampedLeastSquares, 0.2)]
+)
+def test_a_table_may_hold_partial_calls(install: Install, entry: object) -> None:
+    """functools.partial sets parameters of a class, by name or by place."""
+    install("dikbench.formulations", theirs=_laws(soft=entry))
     assert make_formulation("soft") == DampedLeastSquares(0.2)
     assert make_formulation("soft[damping=0.3]") == DampedLeastSquares(0.3)
+    assert plugins("formulation")["soft"].parameters["damping"].default == 0.2
 
 
 def test_two_plugins_of_one_name_are_an_error_that_names_both_files(install: Install) -> None:
@@ -183,7 +193,7 @@ def test_a_name_that_no_selector_could_say_is_an_error(install: Install, name: o
 
 @pytest.mark.parametrize("build", [3, "dls", None])
 def test_an_entry_that_is_no_class_is_named(install: Install, build: object) -> None:
-    """A table holds classes, instances of them, or partial calls."""
+    """A table holds classes, or instances of one."""
     install("dikbench.formulations", theirs={"theirs": build})
     assert error_of(make_formulation, "theirs") == (
         "/somewhere/theirs.py: formulation 'theirs' is no class, nor an instance of one"
@@ -194,6 +204,85 @@ def test_a_formulation_without_velocity_is_an_error(install: Install) -> None:
     """The message says which method is missing, and in which file."""
     install("dikbench.formulations", theirs={"dict": dict})
     assert "'dict' has no method velocity(problem, solve)" in error_of(make_formulation, "dict")
+
+
+def test_a_function_is_no_family(install: Install) -> None:
+    """One line that says what is one, as for a class that is not derived from `Family`."""
+
+    def mine(seed: int = 0) -> None:
+        """Return nothing at all."""
+
+    install("dikbench.scenarios", theirs={"mine": mine})
+    assert error_of(make_scenario, "mine") == (
+        "/somewhere/theirs.py: scenario 'mine' is no class, nor an instance of one"
+    )
+    install("dikbench.scenarios", theirs={"mine": DampedLeastSquares})
+    assert error_of(make_scenario, "mine").endswith(
+        "scenario 'mine' is not derived from dikbench.scenario.Family"
+    )
+
+
+FAMILY = """
+from dataclasses import dataclass
+from dikbench.scenario import Case, Family
+
+{decorator}
+class Mine(Family):
+    {field}
+    def case(self, robot, change):
+        return {case}
+"""
+
+
+def _family(tmp_path: Path, field: str, case: str = "None", decorator: str = "") -> str:
+    path = tmp_path / f"family_{len(list(tmp_path.iterdir()))}.py"
+    decorator = decorator or "@dataclass(frozen=True, kw_only=True)"
+    path.write_text(FAMILY.format(decorator=decorator, field=field, case=case))
+    return f"{path}:Mine"
+
+
+def test_what_a_family_does_wrong_is_one_line_with_its_selector(tmp_path: Path) -> None:
+    """An exception of its own, a case that is none, a class that was not meant so."""
+    selector = _family(tmp_path, "", "1 / 0")
+    assert error_of(make_scenario, selector) == (
+        f"scenario {selector}: ZeroDivisionError: division by zero"
+    )
+    selector = _family(tmp_path, "", "None")
+    assert error_of(make_scenario, selector).startswith(f"scenario {selector}: AttributeError: ")
+    selector = _family(tmp_path, "length: float = 1.0", decorator="# none")
+    message = error_of(make_scenario, selector)
+    assert message.endswith("scenario 'Mine': class Mine: write @dataclass(frozen=True) above it")
+    selector = _family(tmp_path, "dt = 0.005")
+    message = error_of(make_scenario, selector)
+    assert "cannot be imported" in message
+    assert "dt = 0.005 has no type" in message
+
+
+def test_a_family_from_a_file(tmp_path: Path) -> None:
+    """`path/to/file.py:Class`, with parameters; what is not there is named with its neighbours."""
+    selector = _family(tmp_path, "length: float = 1.0")
+    plugin = scenario_plugin(selector)
+    assert plugin.parameters["length"].default == 1.0
+    assert plugin.file == selector.rpartition(":")[0]
+    assert "did you mean 'length'?" in error_of(make_scenario, f"{selector}[lenght=2]")
+    assert "valid: Mine" in error_of(make_scenario, selector.replace(":Mine", ":Mien"))
+    missing = f"{tmp_path}/none.py"
+    assert error_of(make_scenario, f"{missing}:Mine") == f"scenario file not found: {missing}"
+
+
+def test_a_family_without_a_variation_takes_seeds(tmp_path: Path) -> None:
+    """A seed that changes nothing of the scenario still draws the noise of a plant."""
+    selector = _family(
+        tmp_path,
+        "",
+        "Case(target_at_rest(placement_of(robot, robot.q0), 1.0), robot.q0, None, ())",
+    )
+    path = Path(selector.rpartition(":")[0])
+    names = "Case, Family, placement_of, target_at_rest"
+    path.write_text(path.read_text().replace("Case, Family", names, 1))
+    first, second = make_scenario(selector, 0), make_scenario(selector, 1)
+    assert (first.q0 == second.q0).all()
+    assert "seed -1 must not be negative" in error_of(make_scenario, selector, -1)
 
 
 def _reach(robot: str = "planar3r", seed: int = 0) -> object:

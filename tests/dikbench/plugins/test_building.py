@@ -9,7 +9,12 @@ import pytest
 from makers.plugins import law_with
 from makers.scenarios import error_of
 
-from dikbench.plugins.building import make_formulation, make_scenario
+from dikbench.plugins.building import (
+    make_family,
+    make_formulation,
+    make_scenario,
+    scenario_parameters,
+)
 from dikbench.plugins.finding import formulation_plugin, plugins
 from formulations.damped_least_squares import DampedLeastSquares
 from formulations.pseudo_inverse import PseudoInverse
@@ -23,7 +28,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from dikbench.arrays import Array
-from dikbench.problem import DikProblem, Program, Solve
+from dikbench.problem import DikProblem, ProgramKind, Solve
 
 
 @dataclass(frozen=True)
@@ -38,7 +43,7 @@ class Mine:
     careful: bool = False
     side: Literal["left", "right"] = "left"
 
-    program: ClassVar[Program] = "qp"
+    program: ClassVar[ProgramKind] = "qp"
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
@@ -240,3 +245,34 @@ def test_a_law_that_refuses_its_parameters_is_an_error_of_one_line(tmp_path: Pat
     message = error_of(make_formulation, f"{selector}[gain=-1]")
     assert "Law" in message
     assert "gain must not be negative" in message
+
+
+def test_ranges_of_a_law_without_a_base_are_checked(tmp_path: Path) -> None:
+    """A plain frozen dataclass may have ranges in its annotations; a selector is held to them."""
+    selector = law_with(
+        tmp_path,
+        "gain: Annotated[float, Range(0.0, 2.0, '1/s')] = 1.0",
+        "from typing import Annotated\nfrom dikbench.problem import Range",
+    )
+    law: Any = make_formulation(f"{selector}[gain=2]")
+    assert law.gain == 2.0
+    for value in ("3", "nan", "-1"):
+        message = error_of(make_formulation, f"{selector}[gain={value}]")
+        assert message == f"formulation Law: gain={float(value)} must be 0 to 2 [1/s]"
+
+
+def test_a_parameter_with_one_value_is_not_offered() -> None:
+    """A family that fixes its frame says so where one is given, and lists it nowhere."""
+    assert make_scenario("greedy-trap[robot=planar1r]").robot.name == "planar1r"
+    assert "frame='tool0' is not valid" in error_of(make_scenario, "step[frame=tool0]")
+    assert "frame" not in error_of(make_scenario, "step[frme=tool0]").partition("valid:")[2]
+
+
+def test_the_values_of_a_selector_s_parameters() -> None:
+    """Given ones and defaults, in their types; the seed is none of them."""
+    values = scenario_parameters("near-miss[miss=0,robot=panda]")
+    assert values["miss"] == 0.0
+    assert isinstance(values["miss"], float)
+    assert (values["robot"], values["dt"], values["singularity"]) == ("panda", 0.005, "auto")
+    assert "seed" not in values
+    assert make_family("reach") == make_family("reach[distance=0.1]")
