@@ -66,7 +66,7 @@ class Asked:
 
     @cached_property
     def answers(self) -> list[tuple[State, Answer]]:
-        """Every state of the contract, in order, with what the formulation gave."""
+        """Ask at every state of the contract, in order."""
         return [(state, self.answer(state.problem)) for state in states()]
 
     def verified(self) -> Iterator[tuple[State, Array, float]]:
@@ -88,5 +88,5 @@ class Asked:
 
 
 def asked_of(formulation: Formulation | Asked, solver: str | None) -> Asked:
-    """A formulation with its solver; one that is asked already, with its own, stays as it is."""
+    """Pair a formulation with its solver; one that is paired already stays as it is."""
     return formulation if isinstance(formulation, Asked) else Asked(formulation, solver)

@@ -88,7 +88,7 @@ def _is_of(parameter: Parameter, *kinds: type) -> bool:
 
 
 def _outside(parameter: Parameter) -> list[float]:
-    """Numbers that a parameter must not be: NaN, infinity, and what is next to its ends."""
+    """List numbers that a parameter must not be: NaN, infinity, and what is next to its ends."""
     found = [nan, np.inf, -np.inf]
     assert parameter.range is not None
     for end, away in ((parameter.range.low, -1.0), (parameter.range.high, 1.0)):
@@ -99,7 +99,7 @@ def _outside(parameter: Parameter) -> list[float]:
 
 
 def _ends(parameter: Parameter) -> list[float]:
-    """The finite ends of the range of a parameter and of the bounds in which it is drawn."""
+    """List the finite ends of the range of a parameter and of the bounds in which it is drawn."""
     assert parameter.range is not None
     ends = [parameter.range.low, parameter.range.high]
     if parameter.drawn is not None and not isnan(parameter.drawn.low):

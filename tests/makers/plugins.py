@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def law_with(folder: Path, fields: str, imports: str = "") -> str:
-    """Write a formulation with these fields; its selector."""
+    """Write a formulation with these fields, and give its selector."""
     path = folder / "law.py"
     path.write_text(
         "from __future__ import annotations\n"

@@ -30,14 +30,14 @@ from dikbench.solvers.checked_solve import CheckedSolve, make_solve
 
 
 def planar_robot(*lengths: float, velocity: float) -> Robot:
-    """A planar arm of links [m], its joints limited in velocity [rad/s], whose task is its tip."""
+    """Make a planar arm of links [m] whose task is its tip, limited in velocity [rad/s]."""
     model = planar_arm(lengths, velocity_limits=(velocity,) * len(lengths))
     q0 = np.zeros(len(lengths))
     return Robot(f"planar{len(lengths)}r", model, "tip", model_limits(model), q0, (0, 1))
 
 
 def with_limits_in_force(name: str, kinds: str) -> Robot:
-    """A robot with position limits (q), velocity limits (v), both or none in force."""
+    """Load a robot with position limits (q), velocity limits (v), both or none in force."""
     robot = load_robot(name)
     if "q" not in kinds:
         robot = robot.with_limits(position=None)
@@ -45,7 +45,7 @@ def with_limits_in_force(name: str, kinds: str) -> Robot:
 
 
 def with_upper_limit(name: str, joint: int, upper: float) -> Robot:
-    """A robot of whose joints one has another upper position limit [rad]."""
+    """Load a robot and give one of its joints another upper position limit [rad]."""
     robot = load_robot(name)
     position = robot.limits.position
     assert position is not None
@@ -55,14 +55,14 @@ def with_upper_limit(name: str, joint: int, upper: float) -> Robot:
 
 
 def kinematics_at(robot: Robot, q: Array) -> Kinematics:
-    """The kinematics of a robot at a configuration (nq,)."""
+    """Make the kinematics of a robot at a configuration (nq,)."""
     kinematics = Kinematics(robot)
     kinematics.update(q)
     return kinematics
 
 
 def task_jacobian(robot: Robot, q: Array) -> Array:
-    """The Jacobian of the task frame in the rows that the robot can move, by Pinocchio alone."""
+    """Compute the task Jacobian, in the rows that the robot can move, by Pinocchio alone."""
     J: Array = pin.computeFrameJacobian(
         robot.model, robot.model.createData(), q, robot.frame_id, pin.LOCAL
     )
@@ -70,12 +70,12 @@ def task_jacobian(robot: Robot, q: Array) -> Array:
 
 
 def equation(J: Array, V: Array, priority: int = 1) -> LinearizedTask:
-    """A task J v = V in numbers, without an error."""
+    """Make a task J v = V in numbers, without an error."""
     return LinearizedTask(J, V, np.zeros(len(V)), 1.0, priority)
 
 
 def equations(*tasks: tuple[Array, Array]) -> list[LinearizedTask]:
-    """Tasks J v = V in numbers, one for each priority."""
+    """Make tasks J v = V in numbers, one for each priority."""
     return [equation(J, V, priority) for priority, (J, V) in enumerate(tasks, start=1)]
 
 
@@ -86,12 +86,12 @@ def problem_at(
     v_prev: Array | None = None,
     dt: float = 0.01,
 ) -> DikProblem:
-    """A control step at a configuration (nq,), by default without a motion before."""
+    """Make a control step at a configuration (nq,), by default without a motion before."""
     return DikProblem(robot, q, v_prev, dt, tasks, robot.limits.at(q))
 
 
 def problem_of(*tasks: LinearizedTask, robot: str | Robot = "planar3r") -> DikProblem:
-    """A control step at the start of a robot with tasks given in numbers.
+    """Make a control step at the start of a robot with tasks given in numbers.
 
     For formulations that look at nothing else: J may be of another size than the robot.
     """
@@ -100,13 +100,13 @@ def problem_of(*tasks: LinearizedTask, robot: str | Robot = "planar3r") -> DikPr
 
 
 def solve_for(formulation: Formulation, solver: str = "daqp") -> CheckedSolve:
-    """A solver for a formulation; none where it needs none."""
+    """Make the solve of a formulation, with a solver where it needs one."""
     program = program_of(formulation)
     return make_solve(None if program is None else parse_solver(solver), program)
 
 
 def velocity_of(formulation: str | Formulation, problem: DikProblem, solver: str = "daqp") -> Array:
-    """What a formulation answers; it may raise `CannotAnswer`."""
+    """Ask a formulation for its velocity; it may raise `CannotAnswer`."""
     law = make_formulation(formulation) if isinstance(formulation, str) else formulation
     solve = solve_for(law, solver)
     solve.begin_step(0)
@@ -133,7 +133,7 @@ def limits_at_distances(
     velocity: object = None,
     acceleration: object = None,
 ) -> Limits:
-    """Limits of joints whose distances to their position limits are given, (nv,)."""
+    """Make limits of joints whose distances to their position limits are given, (nv,)."""
     below, above = (np.atleast_1d(np.asarray(d, float)) for d in (to_lower, to_upper))
     n = len(below)
     joint = JointLimits(
@@ -148,7 +148,7 @@ def limits_at_distances(
 
 
 def interval_of(value: object, n: int) -> Interval | None:
-    """A pair (lower, upper), a symmetric magnitude, or None."""
+    """Make an interval of a pair (lower, upper), a symmetric magnitude, or None."""
     if value is None:
         return None
     lower, upper = value if isinstance(value, tuple) else (-np.asarray(value), value)

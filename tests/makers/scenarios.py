@@ -47,7 +47,7 @@ def planar_scenario(
     gain: float = 2.0,
     **limits: Any,
 ) -> Scenario:
-    """A planar arm that is to follow the pose of q0 + t rate, from its own velocity on."""
+    """Make a planar arm that is to follow the pose of q0 + t rate, from its own velocity on."""
     robot = load_robot("planar3r").with_limits(**limits)
     q0 = np.array([0.4, 0.8, 0.7])
     return Scenario(
@@ -76,12 +76,12 @@ class Recording:
 
 
 def exact(problem: DikProblem) -> Array:
-    """The velocity that does the task."""
+    """Compute the velocity that does the task."""
     return np.linalg.solve(problem.primary.J, problem.primary.V).astype(np.float64, copy=False)
 
 
 def at_step(k: int, wrong: Callable[[], Any]) -> Callable[[DikProblem], Any]:
-    """A formulation that does the task until step k, and then something wrong."""
+    """Make a formulation that does the task until step k, and then something wrong."""
     steps = iter(range(10**6))
     return lambda problem: wrong() if next(steps) == k else exact(problem)
 
@@ -114,12 +114,12 @@ def run_of(law: str, scenario: Scenario, *, plant: str = "ideal", solver: str = 
 
 
 def metrics_of(law: str, scenario: Scenario, plant: str = "ideal") -> dict[str, float]:
-    """Every metric of such a run."""
+    """Evaluate every metric of such a run."""
     return evaluate(motion_of(run_of(law, scenario, plant=plant).trace, scenario))
 
 
 def error_of(make: Callable[..., object], *args: object) -> str:
-    """The error of the user that a call ends in: one line."""
+    """Catch the error of the user that a call ends in: one line."""
     with pytest.raises(DikbenchError) as caught:
         make(*args)
     assert "\n" not in str(caught.value)
@@ -127,18 +127,18 @@ def error_of(make: Callable[..., object], *args: object) -> str:
 
 
 def scenario_error(selector: str) -> str:
-    """Likewise of the scenario that a selector stands for."""
+    """Catch likewise the error of the scenario that a selector stands for."""
     return error_of(make_scenario, selector)
 
 
 def put_robot(monkeypatch: pytest.MonkeyPatch, robot: object) -> None:
-    """Let every family find this robot, whatever the name that it asks for."""
+    """Make every family find this robot, whatever the name that it asks for."""
     module = sys.modules["dikbench.scenario.family"]
     monkeypatch.setattr(module, "load_robot", lambda name, frame: robot)
 
 
 def known_singularity(robot: str, name: str) -> tuple[Robot, Singularity]:
-    """A robot, and its singular configuration of a name in `SINGULAR_POSTURES`."""
+    """Load a robot, and find its singular configuration of a name in `SINGULAR_POSTURES`."""
     arm = load_robot(robot)
     postures: Mapping[Any, SingularPosture] = SINGULAR_POSTURES[robot]
     near = pin.integrate(arm.model, pin.neutral(arm.model), np.array(postures[name].posture))
