@@ -1,15 +1,19 @@
 """dikbench: a benchmark suite for differential inverse kinematics.
 
 A study crosses formulations with scenarios, solvers and seeds into trials; a trial is simulated
-into a trace; metrics read the trace; the store keeps one row per trial; the report reads the store.
+into a trace; metrics read the trace; results keep one row per trial; the report reads the results.
+
+Authors import from `dikbench.problem` for a formulation, `dikbench.scenario` for a family,
+`dikbench.metrics` for a metric and `dikbench.testing` for the contract.
 """
 
 from __future__ import annotations
 
 import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
+    from dikbench.cli.running import run_study
     from dikbench.errors import DikbenchError, Infeasible, SolverFailed
     from dikbench.problem.constraints import CollisionConstraint, Constraint, TorqueConstraint
     from dikbench.problem.problem import DikProblem, Formulation, Solve
@@ -32,37 +36,34 @@ if TYPE_CHECKING:
     from dikbench.simulation.one_step import DikAnswer, solve_dik
     from dikbench.simulation.status import Status
 
-_HOME = {
-    "BoxObstacle": "robots.collision.obstacles",
-    "CapsuleObstacle": "robots.collision.obstacles",
-    "CentreOfMassTask": "problem.tasks",
-    "CollisionConstraint": "problem.constraints",
-    "Constraint": "problem.constraints",
-    "DampingTask": "problem.tasks",
-    "DikAnswer": "simulation.one_step",
-    "DikProblem": "problem",
-    "DikbenchError": "errors",
-    "Formulation": "problem",
-    "Infeasible": "errors",
-    "LinearizedTask": "problem.tasks",
-    "OrientationTask": "problem.tasks",
-    "PoseTask": "problem.tasks",
-    "PositionTask": "problem.tasks",
-    "PostureTask": "problem.tasks",
-    "QuadraticProgram": "programs.quadratic_program",
-    "Results": "results.reading",
-    "Robot": "robots.robot",
-    "Scenario": "scenario",
-    "Solve": "problem",
-    "SolverFailed": "errors",
-    "SphereObstacle": "robots.collision.obstacles",
-    "Status": "simulation.status",
-    "Task": "problem.tasks",
-    "TorqueConstraint": "problem.constraints",
-    "load_results": "results.reading",
-    "load_robot": "robots.catalogue",
-    "solve_dik": "simulation.one_step",
+    __version__: str
+
+_HOME: Final = {
+    "errors": ("DikbenchError", "Infeasible", "SolverFailed"),
+    "problem.constraints": ("CollisionConstraint", "Constraint", "TorqueConstraint"),
+    "problem.problem": ("DikProblem", "Formulation", "Solve"),
+    "problem.tasks": (
+        "CentreOfMassTask",
+        "DampingTask",
+        "LinearizedTask",
+        "OrientationTask",
+        "PoseTask",
+        "PositionTask",
+        "PostureTask",
+        "Task",
+    ),
+    "programs.quadratic_program": ("QuadraticProgram",),
+    "results.reading": ("Results", "load_results"),
+    "robots.catalogue": ("load_robot",),
+    "robots.collision.obstacles": ("BoxObstacle", "CapsuleObstacle", "SphereObstacle"),
+    "robots.robot": ("Robot",),
+    "cli.running": ("run_study",),
+    "scenario.scenario": ("Scenario",),
+    "simulation.one_step": ("DikAnswer", "solve_dik"),
+    "simulation.status": ("Status",),
 }
+
+_DOORS: Final = ("metrics", "problem", "scenario", "testing")
 
 __all__ = [
     "BoxObstacle",
@@ -91,14 +92,28 @@ __all__ = [
     "Status",
     "Task",
     "TorqueConstraint",
+    "__version__",
     "load_results",
     "load_robot",
+    "run_study",
     "solve_dik",
 ]
 
 
 def __getattr__(name: str) -> Any:
     """Import a public name on first use, so that `dikbench --help` does not wait for Pinocchio."""
-    if name not in _HOME:
-        raise AttributeError(f"module 'dikbench' has no attribute {name!r}")
-    return getattr(importlib.import_module(f"dikbench.{_HOME[name]}"), name)
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("dikbench")
+    if name in _DOORS:
+        return importlib.import_module(f"dikbench.{name}")
+    for module, names in _HOME.items():
+        if name in names:
+            return getattr(importlib.import_module(f"dikbench.{module}"), name)
+    raise AttributeError(f"module 'dikbench' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """List the public names and the doors, imported or not."""
+    return sorted([*__all__, *_DOORS])

@@ -1,4 +1,4 @@
-"""Where on a path the frame is that follows it: the nearest point, without jumps to other laps."""
+"""The position of a frame along a path: the nearest point, without jumps to other laps."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from dikbench.arrays import Array, Indices
 from dikbench.scenario.reference.path import ReferencePath
 
 SEARCH_AHEAD_M: Final = 0.02
-"""How far ahead along the path the nearest point is searched for."""
+"""Path length ahead within which the nearest point is searched."""
 
 MIN_GAIN_FARTHER_AHEAD_M: Final = 1e-3
-"""A point farther ahead counts only if it is nearer by more than this and half a piece."""
+"""A point farther ahead must be nearer by more than this and half a piece."""
 
 COARSE_SEARCH_INSTANTS: Final = 256
-"""At about this many instants of a run the whole path up to the target is searched."""
+"""Approximate number of instants at which the whole path up to the target is searched."""
 
 
 def follow_path(path: ReferencePath, points: Array, targets: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Off the path, and late on it: a distance from the target does not distinguish the two."""
+"""Distance from the path, and delay along it: parts of the distance from the target."""
 
 from __future__ import annotations
 

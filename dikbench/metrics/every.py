@@ -1,4 +1,4 @@
-"""Every metric, and a motion by all of them."""
+"""All metrics, and their values for a motion."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from dikbench.metrics.constraints import CONSTRAINTS
 from dikbench.metrics.contour import CONTOUR
+from dikbench.metrics.distance_and_torque import CONSTRAINTS
 from dikbench.metrics.metric import Metric
 from dikbench.metrics.motion import Motion
 from dikbench.metrics.null_space_drift import NULL_SPACE_DRIFT
@@ -28,7 +28,7 @@ METRICS: Mapping[str, Metric] = MappingProxyType(
 def evaluate(motion: Motion) -> dict[str, float]:
     """Compute every metric of a motion, by name.
 
-    A motion that is not finite came to nothing: each metric has its worst value.
+    For a motion that is not finite each metric has its worst value.
     """
     trace = motion.trace
     recorded = (trace.q, trace.tau, trace.wanted, trace.applied)

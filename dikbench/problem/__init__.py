@@ -1,4 +1,4 @@
-"""One control step, and all that the author of a formulation imports.
+"""One control step: everything that the author of a formulation imports.
 
 The problem and its parts (tasks, limits, the velocity box, rows G v <= h), the programs that a
 solver is handed, and linear algebra.
@@ -50,9 +50,10 @@ from dikbench.problem.tasks import (
 )
 from dikbench.problem.tasks.orientation import LinearizedOrientation
 from dikbench.problem.tasks.task import LinearizedJointTask, LinearizedTask
-from dikbench.problem.velocity_box import Box, Braking, sqrt_brake
+from dikbench.problem.velocity_box import Box, Braking
 from dikbench.programs.modelled_program import ModelledProgram
-from dikbench.programs.quadratic_program import Program, QuadraticProgram
+from dikbench.programs.quadratic_program import ProgramKind, QuadraticProgram
+from dikbench.robots.braking import sqrt_brake, viable_brake
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.limits import Interval, Limits
 from dikbench.robots.robot import Robot
@@ -83,7 +84,7 @@ __all__ = [
     "PoseTask",
     "PositionTask",
     "PostureTask",
-    "Program",
+    "ProgramKind",
     "Projector",
     "QuadraticProgram",
     "Range",
@@ -107,5 +108,6 @@ __all__ = [
     "solve_positive_definite",
     "sqrt_brake",
     "thin_svd",
+    "viable_brake",
     "volume",
 ]

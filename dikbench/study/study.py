@@ -1,20 +1,19 @@
-"""Studies: which cells to run. One TOML file; it only selects and sets parameters."""
+"""Studies: TOML files that select cells and set their parameters."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from types import MappingProxyType
+from typing import Annotated, Any, Final, Literal
 
 import msgspec
 
 from dikbench.errors import DikbenchError, unknown
-from dikbench.plugins.building import (
-    make_formulation,
-)
+from dikbench.plugins.building import in_declared_order, make_formulation
 from dikbench.problem.problem import program_of
-from dikbench.programs.quadratic_program import Program
+from dikbench.programs.quadratic_program import ProgramKind
 from dikbench.scenario.oracle import ORACLE
 from dikbench.scenario.plant import REFERENCE_MODES
 from dikbench.selector import Selector, alternatives, parse_selector
@@ -22,6 +21,10 @@ from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER
 from dikbench.study.split import SPLITS
 
 DEFAULT_STUDY = "quick"
+
+KIND_OF_AXIS: Final[Mapping[str, Literal["formulation", "scenario", "plant"]]] = MappingProxyType(
+    {"formulations": "formulation", "scenarios": "scenario", "plants": "plant"}
+)
 
 NOT_EMPTY = msgspec.Meta(min_length=1)
 Names = Annotated[tuple[str, ...], NOT_EMPTY]
@@ -38,10 +41,10 @@ class TimingSettings(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """The timing pass.
 
     Attributes:
-        reference: the formulation whose run supplies the problems of each scenario.
-        problems: how many of them, contiguous, from the middle of the run.
-        rounds: how often they are replayed.
-        scenarios: which of the study's scenarios are timed; empty: all.
+        reference: the formulation whose run gives the problems of each scenario.
+        problems: number of contiguous problems, from the middle of the run.
+        rounds: number of rounds in which they are solved.
+        scenarios: the scenarios of the study to time; empty: all.
     """
 
     reference: str
@@ -51,18 +54,18 @@ class TimingSettings(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Study(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """A selection of cells; selectors stand in it as text.
+    """A selection of cells, with selectors as texts.
 
     Attributes:
         description: one line.
         cells: formulations with their solvers.
         scenarios: selectors of scenarios.
         plants, references, seeds: see `Trial`.
-        split: "train" or "test" holds the study to the seeds and scenarios of that split (see
+        split: "train" or "test" restricts the study to the seeds and scenarios of that split (see
             `dikbench.study.split`); empty: any.
-        example: the scenario whose runs are drawn against time; default: the first one.
-        timing: the timing pass; None: no times are taken.
-        name: the study's name (from the file's).
+        example: the scenario whose runs are drawn over time; default: the first one.
+        timing: the timing pass; None: no timing.
+        name: name of the study; default: the file's.
     """
 
     description: str
@@ -78,7 +81,7 @@ class Study(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 def shipped_studies() -> dict[str, Path]:
-    """The studies that come with dikbench, by name."""
+    """Return the files of the studies that come with dikbench, by name."""
     folder = Path(str(resources.files("dikbench.study") / "studies"))
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
@@ -110,28 +113,41 @@ def load_study(name_or_file: str) -> Study:
 
 
 def _spread(study: Study) -> Study:
-    """The study with one value per parameter in each of its selectors (see `alternatives`)."""
+    """Return the study with one value per parameter in each selector (see `alternatives`)."""
     timing, example = study.timing, study.example
     if timing is not None:
-        timing = msgspec.structs.replace(timing, scenarios=_each(timing.scenarios))
+        timing = msgspec.structs.replace(timing, scenarios=_each("scenarios", timing.scenarios))
     return msgspec.structs.replace(
         study,
-        cells=tuple(Cells(_each(c.formulations), _each(c.solvers)) for c in study.cells),
-        scenarios=_each(study.scenarios),
-        plants=_each(study.plants),
-        example=str(parse_selector(example)) if example else "",
+        cells=tuple(
+            Cells(_each("formulations", c.formulations), _each("solvers", c.solvers))
+            for c in study.cells
+        ),
+        scenarios=_each("scenarios", study.scenarios),
+        plants=_each("plants", study.plants),
+        example=str(in_declared_order("scenario", example)) if example else "",
         timing=timing,
     )
 
 
-def _each(selectors: Iterable[str]) -> tuple[str, ...]:
-    """Every selector that a list of them stands for, in its canonical text, each once."""
-    found = dict.fromkeys(one for given in selectors for one in alternatives(given))
-    return tuple(map(str, found))
+def _each(axis: str, selectors: Iterable[str]) -> tuple[str, ...]:
+    """List the selectors that those of an axis stand for, each once, in canonical form."""
+    found: dict[str, None] = {}
+    for given in selectors:
+        for one in alternatives(given):
+            found[str(_canonical(axis, one))] = None
+    return tuple(found)
+
+
+def _canonical(axis: str, selector: Selector) -> Selector:
+    """Put the parameters of a selector in one order."""
+    if axis == "solvers":
+        return selector.ordered(("interface", "preset", *sorted(selector.parameters)))
+    return in_declared_order(KIND_OF_AXIS[axis], selector)
 
 
 def _explained(reason: str) -> str:
-    """An error of msgspec, with the valid keys where the key was wrong."""
+    """Explain an error of msgspec, with the valid keys where the key was wrong."""
     if "Invalid enum value" in reason:
         return f"{reason}; valid: {', '.join(SPLITS if 'split' in reason else REFERENCE_MODES)}"
     if "unknown field" not in reason:
@@ -142,7 +158,7 @@ def _explained(reason: str) -> str:
 
 
 class Selection(msgspec.Struct, frozen=True):
-    """What replaces axes of a study; an empty axis stays the study's own."""
+    """Replacements of the axes of a study; an empty axis keeps the study's own."""
 
     formulations: tuple[str, ...] = ()
     scenarios: tuple[str, ...] = ()
@@ -153,10 +169,10 @@ class Selection(msgspec.Struct, frozen=True):
 
 
 def select(base: Study, selection: Selection, *, named: bool) -> Study:
-    """A study with some of its axes replaced.
+    """Return a study with some of its axes replaced.
 
-    A formulation that is given without a solver keeps the solvers that a named study has for it;
-    otherwise it runs with the default solver.
+    Without solvers in the selection, a formulation has the solvers that a named study has for it,
+    else the default solver.
 
     Args:
         base: the study to start from.
@@ -167,10 +183,7 @@ def select(base: Study, selection: Selection, *, named: bool) -> Study:
         return base
     selection = msgspec.structs.replace(
         selection,
-        **{
-            axis: _each(getattr(selection, axis))
-            for axis in ("formulations", "scenarios", "solvers", "plants")
-        },
+        **{axis: _each(axis, getattr(selection, axis)) for axis in (*KIND_OF_AXIS, "solvers")},
     )
     cells = base.cells
     if selection.formulations:
@@ -203,7 +216,7 @@ def _cells_for(base: Study, formulation: Selector, named: bool) -> Cells:
     return Cells((str(formulation),), (DEFAULT_SOLVER[program],))
 
 
-def _program(formulation: Selector) -> Program | None:
+def _program(formulation: Selector) -> ProgramKind | None:
     """Return what a formulation needs a solver for; the oracle needs none."""
     if formulation.name == ORACLE:
         return None

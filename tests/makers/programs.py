@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dikbench.arrays import Array
-from dikbench.programs.quadratic_program import Program, QuadraticProgram
+from dikbench.programs.quadratic_program import ProgramKind, QuadraticProgram
 from dikbench.solvers.catalogue.back_ends import BACK_ENDS, is_installed, parse_solver
 from dikbench.solvers.checked_solve import CheckedSolve, make_solve
 
@@ -27,7 +27,7 @@ ACCURACY: Final = 5e-3
 """The loosest default tolerance (OSQP's 1e-3), with room for the conditioning of the examples."""
 
 
-def solve_with(selector: str, program: Program = "qp") -> CheckedSolve:
+def solve_with(selector: str, program: ProgramKind = "qp") -> CheckedSolve:
     """Make the solve of a solver."""
     return make_solve(parse_solver(selector), program)
 

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from dikbench.metrics import METRICS
-from dikbench.results.columns import KEYS, RATES, SELECTORS, TIMES
+from dikbench.results.columns import CONTROL_RATES_HZ, KEYS, SELECTORS, TIMES
 from dikbench.results.selected import selected_columns, with_selected
 
 Values = Mapping[str, Any]
@@ -104,7 +104,9 @@ def random_rows(
     }
     table = table.assign(**drawn | {"timing_samples": 100, "timing_stability": "stable"})
     table["progress_mean"] = table["progress_min"] = 1.0 - table["progress_mean"].clip(upper=1.0)
-    return with_selected(table.assign(**{f"missed_{rate}_hz_share": 0.0 for rate in RATES}))
+    return with_selected(
+        table.assign(**{f"missed_{rate}_hz_share": 0.0 for rate in CONTROL_RATES_HZ})
+    )
 
 
 def bare_rows(**columns: Sequence[object]) -> pd.DataFrame:

@@ -1,4 +1,4 @@
-"""A comparison of two results folders, from reading them to the verdict."""
+"""A comparison of two results folders, from reading them to what became worse."""
 
 from __future__ import annotations
 

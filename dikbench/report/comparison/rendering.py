@@ -27,7 +27,7 @@ def render(comparison: Comparison, rows: int | None = ON_CONSOLE) -> str:
     """
     parts = [
         f"# {comparison.a} (A) and {comparison.b} (B)",
-        _verdict(comparison),
+        _summary(comparison),
         *_statuses(comparison, rows),
         *_metrics(comparison, rows),
         *_times(comparison, rows),
@@ -55,7 +55,7 @@ def write(comparison: Comparison, file: Path) -> None:
         raise DikbenchError(f"file {file}: {error.strerror or error}") from None
 
 
-def _verdict(comparison: Comparison) -> str:
+def _summary(comparison: Comparison) -> str:
     matched, formulations = comparison.matched, comparison.formulations
     told = [f"{len(matched.a)} trials are in both, {int(matched.both_ok.sum())} ended ok in both."]
     worse = matched.newly_failed

@@ -37,14 +37,14 @@ def draw_error_and_time(ran: pd.DataFrame, target: Path) -> list[Figure]:
         (table[~solving], COLOURS[0], "closed form"),
         (table[solving], COLOURS[1], "with a solver"),
     ):
-        for part, fill, verdict in (
+        for part, fill, stability in (
             (group[group["stable"]], colour, ""),
             (group[~group["stable"]], "white", ", timing not stable"),
         ):
             if len(part):
                 axis.scatter(
                     part["time"], part["error"], s=20, facecolors=fill, edgecolors=colour,
-                    label=label + verdict, zorder=3,
+                    label=label + stability, zorder=3,
                 )  # fmt: skip
     logarithmic(axis, "x")
     logarithmic(axis, "y")
@@ -77,12 +77,12 @@ def cost_points(rows: pd.DataFrame) -> pd.DataFrame:
         .agg(
             error=("error", "median"),
             time=("formulation_time_p99_us", "first"),
-            verdict=("timing_stability", "first"),
+            stability=("timing_stability", "first"),
         )
         .reset_index()
     )
     cells = cells[cells["time"].gt(0) & cells["error"].notna()]
-    cells = cells.assign(stable=cells["verdict"].eq(STABLE))
+    cells = cells.assign(stable=cells["stability"].eq(STABLE))
     table = cells.groupby("contender", sort=False).agg(
         solver=("solver", "first"),
         error=("error", "median"),

@@ -12,8 +12,8 @@ from dikbench.arrays import Array
 from dikbench.metrics import Motion
 from dikbench.report.drawing.figure import Figure
 from dikbench.report.drawing.style import COLOURS, WIDTH, look, save, short
+from dikbench.report.selection.declared import declared_family
 from dikbench.report.selection.rows import how, one_way
-from dikbench.report.selection.situations import AT_LIMITS, OUTSIDE, situation_of
 from dikbench.report.selection.stored_motions import (
     in_panels,
     points_per_curve,
@@ -86,15 +86,11 @@ def joint_margin(motion: Motion) -> Array:
 
 
 def _about_limits(example: str, ran: pd.DataFrame) -> str | None:
-    """Choose a scenario whose exact motion comes near a position limit, the example if it does.
-
-    Args:
-        example: the study's example.
-        ran: trials.
-    """
-    seeds = ran.drop_duplicates("scenario").set_index("scenario")["seed"]
-    candidates = [
-        scenario for scenario in dict.fromkeys([example, *seeds.index]) if scenario in seeds
+    """Choose a scenario of a family that is about position limits: the example, or the first."""
+    families = dict(zip(ran["scenario"], ran["scenario_family"], strict=True))
+    about = [
+        scenario
+        for scenario, name in families.items()
+        if (family := declared_family(name)) is not None and family.about_position_limits
     ]
-    near = (s for s in candidates if situation_of(s, int(seeds[s])) in (AT_LIMITS, OUTSIDE))
-    return next(near, None)
+    return example if example in about else next(iter(about), None)

@@ -1,4 +1,4 @@
-"""The phase diagram: what each formulation makes of near misses, over miss distance and speed."""
+"""Phase diagrams: what each formulation makes of a family, over two of its parameters."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ from dikbench.report.drawing.figure import Figure
 from dikbench.report.drawing.panels import place_at_top, small_multiples
 from dikbench.report.drawing.style import label_decades, save
 from dikbench.report.selection.categories import CATEGORIES, OFF_COURSE, SLOW, categories
-from dikbench.report.selection.near_miss_grids import NearMissGrid, near_miss_grids
+from dikbench.report.selection.declared import with_unit
+from dikbench.report.selection.phase_grids import PhaseGrid, phase_grids
 from dikbench.report.selection.rows import error_column, failures_at_infinity, how, pages
 from dikbench.scenario.oracle import ORACLE
 
@@ -27,7 +28,7 @@ PER_PAGE = 20
 """Formulations in one figure."""
 
 GAP = 0.18
-"""Between the column of miss = 0, which is a case of its own, and the others [cells]."""
+"""Between the column of 0, which is a case of its own, and the others [cells]."""
 
 FAILED = "#222222"
 
@@ -53,9 +54,9 @@ class _Map:
 
 
 def draw_phase_diagrams(ran: pd.DataFrame, target: Path) -> list[Figure]:
-    """Draw, for each grid of near misses, the error, the peak speed and the outcome per law."""
+    """Draw for each grid of a family the error, the peak speed and the outcome per formulation."""
     figures = []
-    for number, grid in enumerate(near_miss_grids(ran.assign(outcome=categories(ran))), start=1):
+    for number, grid in enumerate(phase_grids(ran.assign(outcome=categories(ran))), start=1):
         maps = [m for m in _maps(grid) if any(np.isfinite(v).any() for v in m.values.values())]
         parts = pages(_formulations_in_order(grid.rows), PER_PAGE)
         for one in maps:
@@ -63,12 +64,13 @@ def draw_phase_diagrams(ran: pd.DataFrame, target: Path) -> list[Figure]:
                 file = f"phase_diagram_{number}_{one.name}" + (f"_{page}" * (len(parts) > 1))
                 of = f" (part {page} of {len(parts)})" if len(parts) > 1 else ""
                 caption = (
-                    f"{one.explained} Near misses ({grid.others or 'defaults'}), {how(grid.rows)}, "
-                    "a panel per law: the oracle, which moves along the path as asked for, then "
-                    f"from the best formulation to the worst{of}. Black: the trial failed."
+                    f"{one.explained} Scenarios {grid.family} ({grid.others or 'defaults'}), "
+                    f"{how(grid.rows)}, a panel per formulation: the oracle, which moves along the "
+                    f"path as asked for, then from the best to the worst{of}. Black: the trial "
+                    "failed."
                 )
                 title = (
-                    f"Phase diagram of near misses, {grid.others or 'defaults'}: {one.title}{of}"
+                    f"Phase diagram of {grid.family}, {grid.others or 'defaults'}: {one.title}{of}"
                 )
                 figures.append(Figure(_draw(grid, formulations, one, target, file), caption, title))
     return figures
@@ -86,7 +88,7 @@ def _formulations_in_order(rows: pd.DataFrame) -> list[str]:
     return sorted(order, key=lambda name: name != ORACLE)
 
 
-def _maps(grid: NearMissGrid) -> list[_Map]:
+def _maps(grid: PhaseGrid) -> list[_Map]:
     column, name = error_column(grid.rows)
     ended = grid.rows["status"].eq("ok")
     rows = grid.rows.assign(
@@ -141,16 +143,14 @@ def _log_norm(values: Mapping[str, Array], low: float, high: float, least: float
     return LogNorm(bottom, top)
 
 
-def _draw(
-    grid: NearMissGrid, formulations: Sequence[str], one: _Map, target: Path, file: str
-) -> str:
-    edges, centres = _columns(grid.misses)
-    rows = len(grid.speeds)
+def _draw(grid: PhaseGrid, formulations: Sequence[str], one: _Map, target: Path, file: str) -> str:
+    edges, centres = _columns(grid.columns)
+    rows = len(grid.lines)
     figure, axes = small_multiples(
         formulations,
         0.2 * max(rows, 3),
-        "miss distance [m; rad]",
-        "speed [rad/s; m/s]",
+        with_unit(grid.family, grid.across),
+        with_unit(grid.family, grid.up),
         top=0.68 if one.bar else 0.5,
     )
     outcome = grid.values("outcome", "max")
@@ -169,16 +169,16 @@ def _draw(
         axis.tick_params(axis="x", labelrotation=90)
     axes[0].set_xlim(edges[0], edges[-1])  # they share their axes
     axes[0].set_ylim(0, rows)
-    axes[0].set_xticks(centres, [f"{miss:g}" for miss in grid.misses])
-    axes[0].set_yticks(np.arange(rows) + 0.5, [f"{speed:g}" for speed in grid.speeds])
+    axes[0].set_xticks(centres, [f"{value:g}" for value in grid.columns])
+    axes[0].set_yticks(np.arange(rows) + 0.5, [f"{speed:g}" for speed in grid.lines])
     _key(figure, one)
     return save(figure, target, file)
 
 
-def _columns(misses: Sequence[float]) -> tuple[Array, Array]:
-    """Edges and centres of the columns; that of miss = 0 stands apart."""
-    apart = misses[0] == 0.0
-    edges = np.arange(len(misses) + 1.0 - apart)
+def _columns(values: Sequence[float]) -> tuple[Array, Array]:
+    """Compute edges and centres of the columns; that of the value 0 stands apart."""
+    apart = values[0] == 0.0
+    edges = np.arange(len(values) + 1.0 - apart)
     centres = edges[:-1] + 0.5
     if apart:
         edges = np.concatenate([[-GAP - 1.0, -GAP], edges])

@@ -15,6 +15,7 @@ from dikbench.report.drawing.figure import Figure
 from dikbench.report.drawing.panels import small_multiples
 from dikbench.report.drawing.style import COLOURS, file_name, logarithmic, save, short
 from dikbench.report.drawing.value_scale import ValueScale
+from dikbench.report.selection.declared import with_unit
 from dikbench.report.selection.rows import LEAST_ERROR, error_column, how, pages, ranked
 from dikbench.report.selection.sweeps import Sweep, number, sweeps
 
@@ -23,18 +24,6 @@ PER_PAGE = 24
 
 MOST_CURVES = 5
 """In a panel: of more values of the second parameter, so many are drawn, spread over all."""
-
-UNITS = {
-    "miss": " [m; rad]",
-    "speed": "",
-    "depth": " [rad]",
-    "deceleration": " [rad/s^2]",
-    "distance": " [m]",
-    "angle": " [rad]",
-    "outside": " [rad]",
-    "gain": " [1/s]",
-    "dt": " [s]",
-}
 
 
 @dataclass(frozen=True)
@@ -93,7 +82,7 @@ def _draw(
 ) -> str:
     scale = ValueScale(sweep.rows["value"])
     table = _table(sweep, quantity)
-    x_label = f"{sweep.parameter}{UNITS.get(sweep.parameter, '')}"
+    x_label = with_unit(sweep.family, sweep.parameter)
     figure, axes = small_multiples(
         formulations, 0.85, x_label, quantity.label, top=0.62 if sweep.second else 0.22
     )
@@ -124,7 +113,7 @@ def _draw(
         figure.legend(
             handles,
             labels,
-            title=f"{sweep.second}{UNITS.get(sweep.second, '')}",
+            title=with_unit(sweep.family, sweep.second),
             title_fontsize=7,
             loc="upper center",
             ncols=len(labels),

@@ -113,8 +113,8 @@ def _times(trials: pd.DataFrame) -> list[Limitation]:
                 f"Of {len(cells)} timed cells {len(unstable)} are not stable (greyed; timing.csv "
                 "says why); `dikbench time` takes them anew, on a machine that does nothing else.",
                 tuple(
-                    f"{_named(formulation, solver)} on {quoted(scenario)}: {verdict}."
-                    for (formulation, solver, scenario, verdict), _ in _counted(
+                    f"{_named(formulation, solver)} on {quoted(scenario)}: {stability}."
+                    for (formulation, solver, scenario, stability), _ in _counted(
                         unstable, [*CONTENDER, "scenario", "timing_stability"]
                     )
                 ),

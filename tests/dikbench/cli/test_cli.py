@@ -95,6 +95,8 @@ MALFORMED = [
 SHOWN = {
     "qp": "min_v",
     "near-miss[miss=0.05]": "required speed over limit",
+    "near-miss": "miss = 0.02: 0 or 0.001 to 0.2 [m; rad]  (instances: 0.002 to 0.05, logarithmic)",
+    "dls": "damping = 0.05: finite and at least 0  (tuned: 0.001 to 0.3, logarithmic)",
     "osqp": "eps_abs",
     "panda": "panda_hand_tcp",
     "off_course_max_rad": "unit: rad",
@@ -211,6 +213,30 @@ def test_a_law_in_a_file_runs_without_packaging(tmp_path: Path) -> None:
     assert set(trials["status"]) == {"ok"}
     by_formulation = trials[trials["plant"] == "ideal"].set_index("formulation")["progress_mean"]
     assert by_formulation["my_law.py:MyLaw[gain=2]"] > by_formulation["my_law.py:MyLaw"]
+
+
+def test_a_family_in_a_file_runs_without_packaging(tmp_path: Path) -> None:
+    """`path/to/file.py:Class` as a scenario: shown, run in the workers, reported."""
+    (tmp_path / "my_reach.py").write_text(
+        "from dataclasses import dataclass\n"
+        "from scenarios.reach import Reach\n"
+        "@dataclass(frozen=True, kw_only=True)\n"
+        "class Short(Reach):\n"
+        '    """A short reach."""\n'
+        "    distance: float = 0.05\n"
+        "    duration: float = 0.5\n"
+    )
+    shown = dikbench("show", "my_reach.py:Short", cwd=tmp_path)
+    assert shown.returncode == 0, shown.stderr
+    assert "distance = 0.05: 0.01 to 0.3 [m]" in shown.stdout
+    done = dikbench(
+        "run", "--formulation", "dls", "--scenario", "my_reach.py:Short[distance=0.02|0.1]",
+        "--plant", "ideal", "--out", "out", cwd=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    trials = pd.read_csv(tmp_path / "out" / "trials.csv")
+    assert list(trials["status"]) == ["ok", "ok"]
+    assert "A short reach" in (tmp_path / "out" / "report.html").read_text()
 
 
 def test_show_prints_one_thing_in_full(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 from dikbench.metrics import METRICS, evaluate, motion_of
-from dikbench.metrics.constraints import CONSTRAINTS
+from dikbench.metrics.distance_and_torque import CONSTRAINTS
 from dikbench.problem.tasks import PoseTask, PositionTask
 from dikbench.robots.catalogue import load_robot
 from dikbench.scenario import Scenario

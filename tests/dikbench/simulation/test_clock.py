@@ -2,36 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from makers.scenarios import planar_scenario
 
 from dikbench.arrays import Array
-from dikbench.problem.tasks import PoseTask
-from dikbench.robots.catalogue import load_robot
-from dikbench.scenario import Scenario, joint_path
-from dikbench.scenario.certificate import Certificate
 from dikbench.simulation.clock import CLOCKS, Clock, PathClock, TimeClock
 
 V = np.array([0.3, -0.2, 0.5])
 J = np.array([[1.0, 0.5, 0.0], [0.0, 2.0, 0.0], [0.0, 0.3, 1.0]])
-
-
-def _scenario(duration: float = 0.3, dt: float = 0.01) -> Scenario:
-    """A planar arm on a joint path; its tracking has three rows."""
-    robot = load_robot("planar3r")
-    q0, rate = np.array([0.4, 0.8, 0.7]), np.array([0.5, -0.4, 0.6])
-    return Scenario(
-        robot=robot,
-        q0=q0,
-        v0=rate,
-        reference=joint_path(robot, lambda tau: q0 + tau * rate, lambda tau: rate, duration),
-        tracking=PoseTask(),
-        dt=dt,
-        duration=duration,
-        certificate=Certificate(()),
-    )
 
 
 def _advance(clock: Clock, share: float) -> None:
@@ -43,18 +26,17 @@ def test_there_is_a_clock_for_each_reference_mode() -> None:
     """Both begin at 0 and are not over."""
     assert CLOCKS == {"time": TimeClock, "path": PathClock}
     for made in CLOCKS.values():
-        clock = made(_scenario())
+        clock = made(planar_scenario())
         assert clock.tau == 0.0
-        assert not clock.is_over
+        assert len([*itertools.islice(clock, 2)]) == 2
 
 
 @pytest.mark.parametrize("share", [1.0, 0.0, -3.0, 7.0])
 def test_the_time_clock_does_not_look_at_the_robot(share: float) -> None:
     """After k steps tau is k dt to the bit, with the reference there; over at the duration."""
-    scenario = _scenario(dt=0.007)
+    scenario = planar_scenario(dt=0.007)
     clock, found = TimeClock(scenario), []
-    while not clock.is_over:
-        placement, twist = clock.target()
+    for placement, twist in clock:
         expected, expected_twist = scenario.target(clock.tau)
         assert np.array_equal(placement.homogeneous, expected.homogeneous)
         assert np.array_equal(twist.vector, expected_twist.vector)
@@ -68,15 +50,17 @@ def test_the_time_clock_does_not_look_at_the_robot(share: float) -> None:
 @given(shares=st.lists(st.floats(-2, 2), max_size=40))
 def test_the_path_clock_adds_up_the_progress(shares: list[float]) -> None:
     """It is dt sum min(max(alpha_k, 0), 1), at most the duration; the reference is there."""
-    scenario = _scenario()
+    scenario = planar_scenario()
     clock = PathClock(scenario)
     for share in shares:
         _advance(clock, share)
     expected = min(0.01 * np.clip(shares, 0, 1).sum(), 0.3)
     assert clock.tau == pytest.approx(expected, abs=1e-12)
-    assert clock.is_over == (clock.tau >= 0.3 * (1 - 1e-9))
-    placement, twist = clock.target()
-    there = scenario.reference.placement(clock.tau)
+    left = [*itertools.islice(clock, 1)]
+    assert (not left) == (clock.tau >= 0.3 * (1 - 1e-9))
+    if not left:
+        return
+    (placement, twist), there = left[0], scenario.reference.placement(clock.tau)
     assert np.array_equal(placement.homogeneous, there.homogeneous)
     assert np.array_equal(twist.vector, scenario.reference.velocity(clock.tau))
 
@@ -86,14 +70,14 @@ def test_progress_is_along_the_desired_twist() -> None:
     across = np.linalg.solve(J, [0.2, 0.3, 0.0])  # J v across V
     half_linear = np.linalg.solve(J, V * [1.0, 1.0, 0.0])
     for v, alpha in ((across, 0.0), (half_linear, 0.13 / (0.13 + 0.2**2 * 0.25))):
-        clock = PathClock(_scenario())
+        clock = PathClock(planar_scenario())
         clock.advance(V, J, v)
         assert clock.tau == pytest.approx(0.01 * alpha, abs=1e-15)
 
 
 def test_a_dwell_passes_in_full() -> None:
     """Where no motion is desired there is no progress to wait for."""
-    clock = PathClock(_scenario())
+    clock = PathClock(planar_scenario())
     nothing: Array = np.zeros(3)
     clock.advance(nothing, J, nothing)
     assert clock.tau == 0.01
@@ -102,8 +86,8 @@ def test_a_dwell_passes_in_full() -> None:
 def test_the_path_clock_gives_up_after_five_durations() -> None:
     """A robot that stands still, or moves back: 150 steps instead of 30, all of them at tau = 0."""
     for share in (0.0, -1.0):
-        clock, steps = PathClock(_scenario()), 0
-        while not clock.is_over:
+        clock, steps = PathClock(planar_scenario()), 0
+        for _ in clock:
             assert clock.tau == 0.0
             _advance(clock, share)
             steps += 1

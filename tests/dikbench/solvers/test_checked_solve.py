@@ -18,7 +18,7 @@ from dikbench.solvers.catalogue.back_ends import parse_solver
 from dikbench.solvers.catalogue.presets import TOLERANCES
 from dikbench.solvers.checked_solve import CheckedSolve, NoSolve, make_solve
 from dikbench.solvers.interfaces.cold import ColdSolver
-from dikbench.solvers.recheck.optimum import JUDGE, PROVEN, distance_to_optimum
+from dikbench.solvers.recheck.optimum import JUDGE_SOLVER, PROVEN_DISTANCE, distance_to_optimum
 from dikbench.solvers.recheck.rechecked import RecheckedSteps
 from dikbench.solvers.recheck.residuals import residuals
 from dikbench.solvers.recheck.stack import Stack
@@ -144,7 +144,7 @@ def test_without_a_judge_the_distance_is_not_known() -> None:
 def test_the_judge_is_asked_where_nothing_is_proven() -> None:
     """A small bound is taken for the distance; a large one, however wrong, is replaced by it."""
     program, answer = _one_bound(), _said(0.75)
-    bounds = np.array([0.0, 0.5 * PROVEN, 2 * PROVEN, 7.0, np.inf, np.nan])
+    bounds = np.array([0.0, 0.5 * PROVEN_DISTANCE, 2 * PROVEN_DISTANCE, 7.0, np.inf, np.nan])
     found = distance_to_optimum([program] * 6, [answer] * 6, bounds)
     assert found[:2].tolist() == bounds[:2].tolist()
     assert found[2:] == pytest.approx(0.25)
@@ -227,7 +227,7 @@ def test_a_step_takes_the_worst_of_its_answers(
     monkeypatch: pytest.MonkeyPatch, turn: int, batch: int
 ) -> None:
     """Claimed if all are, verified if all are, the largest residual of each kind; in any order."""
-    monkeypatch.setattr(checked_solve, "BATCH", batch)
+    monkeypatch.setattr(checked_solve, "ANSWERS_PER_RECHECK", batch)
     answers = [
         (_one_bound(), _said(1.0, 1.0)),
         (_one_bound(), _said(0.5, 1.5)),  # gap 0.75, distance 0.5
@@ -274,7 +274,7 @@ def _program(random: np.random.Generator, n: int, kind: int) -> QuadraticProgram
 def _run(seed: int, steps: int = 25) -> RecheckedSteps:
     """What is found on a run of up to four answers per step: right, wrong, none, unexplained."""
     random = np.random.default_rng(seed)
-    exact = ColdSolver(JUDGE)
+    exact = ColdSolver(JUDGE_SOLVER)
     script = _Script()
     solve = CheckedSolve(script, tolerance=1e-6)
     solve.begin_run(steps)
@@ -308,7 +308,7 @@ def test_what_is_found_does_not_depend_on_when_it_is_looked_for(
     """Step by step, in small batches, or all at the end; but for the part of proven distances."""
     found = {}
     for batch in (1, 3, 512):
-        monkeypatch.setattr(checked_solve, "BATCH", batch)
+        monkeypatch.setattr(checked_solve, "ANSWERS_PER_RECHECK", batch)
         found[batch] = _run(seed)
     last = found[512]
     assert {-1, 0, 1} == set(last.claimed.tolist()) == set(last.verified.tolist())
@@ -321,7 +321,7 @@ def test_what_is_found_does_not_depend_on_when_it_is_looked_for(
             np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-13, equal_nan=True)
         # A bound that is proof enough stands for the distance, and is that of its batch.
         np.testing.assert_allclose(
-            found[batch].distance, last.distance, rtol=1e-9, atol=PROVEN, equal_nan=True
+            found[batch].distance, last.distance, rtol=1e-9, atol=PROVEN_DISTANCE, equal_nan=True
         )
 
 
@@ -333,7 +333,7 @@ def test_the_recheck_keeps_to_its_batches(monkeypatch: pytest.MonkeyPatch) -> No
         waiting.append(len(solved))
 
     monkeypatch.setattr(RecheckedSteps, "recheck", note)
-    monkeypatch.setattr(checked_solve, "BATCH", 3)
+    monkeypatch.setattr(checked_solve, "ANSWERS_PER_RECHECK", 3)
     solve = CheckedSolve(_Script(*(_said(1.0, 1.0) for _ in range(10))))
     solve.begin_run(5)
     for step in range(5):

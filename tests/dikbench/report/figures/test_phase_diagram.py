@@ -14,7 +14,7 @@ from dikbench.arrays import Array
 from dikbench.report.drawing.style import style
 from dikbench.report.figures.phase_diagram import draw_phase_diagrams, three_digits
 from dikbench.report.selection.categories import CATEGORIES, categories
-from dikbench.report.selection.near_miss_grids import near_miss_grids
+from dikbench.report.selection.phase_grids import phase_grids
 
 MISSES, SPEEDS = (0.0, 0.01, 0.1), (0.2, 1.0)
 
@@ -102,9 +102,9 @@ def test_laws_stand_in_the_order_of_how_they_do(drawn: list[Any], target: Path) 
 
 def test_a_row_of_near_misses_is_no_grid() -> None:
     """Two misses at two speeds are a grid, three misses at one speed are none."""
-    assert len(near_miss_grids(random_rows(["dls"], GRID[:4]))) == 1
-    assert not near_miss_grids(random_rows(["dls"], GRID[::2]))
-    assert not near_miss_grids(random_rows(["dls"], ["near-miss", "reach[miss=1,speed=1]"]))
+    assert len(phase_grids(random_rows(["dls"], GRID[:4]))) == 1
+    assert not phase_grids(random_rows(["dls"], GRID[::2]))
+    assert not phase_grids(random_rows(["dls"], ["near-miss", "reach[miss=1,speed=1]"]))
 
 
 def test_many_laws_make_several_pages(drawn: list[Any], target: Path) -> None:

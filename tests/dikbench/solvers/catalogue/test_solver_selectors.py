@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from dikbench.errors import DikbenchError
 from dikbench.solvers.catalogue.back_ends import (
     BACK_ENDS,
     DEFAULT_SOLVER,
-    INTERFACES,
+    Interface,
     Solver,
     parse_solver,
     why_not,
@@ -121,8 +122,8 @@ def test_the_catalogue_is_consistent() -> None:
     """Interfaces are known ones, defaults can do what they are for, gaps have their reason."""
     for name, back_end in BACK_ENDS.items():
         assert back_end.interfaces
-        assert set(back_end.interfaces) <= set(INTERFACES), name
-        assert set(back_end.ours) <= set(back_end.settings), name
+        assert set(back_end.interfaces) <= set(get_args(Interface)), name
+        assert set(back_end.own_defaults) <= set(back_end.settings), name
         assert ("lp" in back_end.programs) == (not back_end.no_lp), name
     for program, name in DEFAULT_SOLVER.items():
         assert why_not(parse_solver(name), program) == ""

@@ -12,7 +12,7 @@ from dikbench.arrays import Array
 from dikbench.programs.answer import Answer
 from dikbench.programs.quadratic_program import QuadraticProgram
 from dikbench.solvers.catalogue.presets import TOLERANCES
-from dikbench.solvers.recheck.residuals import SAMPLED, Residuals, residuals
+from dikbench.solvers.recheck.residuals import EIGENVALUE_SAMPLE_STRIDE, Residuals, residuals
 from dikbench.solvers.recheck.stack import Stack
 
 pytestmark = LIBRARIES_WARN
@@ -153,7 +153,7 @@ def test_a_stack_gives_each_answer_its_own_residuals() -> None:
     random = np.random.default_rng(0)
     program, x = mixture()
     programs, answers = [], []
-    for k in range(3 * SAMPLED):
+    for k in range(3 * EIGENVALUE_SAMPLE_STRIDE):
         wrong = 10.0 ** random.uniform(-9, 0) * random.normal(size=8)
         scale = 10.0 ** random.uniform(-2, 2)
         programs.append(_scaled(program, scale))
@@ -253,7 +253,9 @@ COSTS = {"strictly-convex": _definite, "linear": _linear}
 def _all_known(cost: str, seed: int) -> tuple[np.random.Generator, list[_Known]]:
     """More programs than one sample of their costs, of one structure."""
     random = np.random.default_rng([seed, len(cost)])
-    return random, [_Known(random, COSTS[cost](random, 5)) for _ in range(3 * SAMPLED)]
+    return random, [
+        _Known(random, COSTS[cost](random, 5)) for _ in range(3 * EIGENVALUE_SAMPLE_STRIDE)
+    ]
 
 
 def _assert_bounded(found: Residuals, distances: list[float]) -> None:
@@ -329,8 +331,8 @@ def test_one_soft_cost_among_stiff_ones_is_not_hidden_by_the_sample() -> None:
         QuadraticProgram(scale * np.eye(2), np.zeros(2), lb=-np.ones(2), ub=np.ones(2))
         for scale in (1.0, 1e-6)
     )
-    for place in (0, 1, SAMPLED - 1, SAMPLED):
-        programs = [stiff] * (2 * SAMPLED)
+    for place in (0, 1, EIGENVALUE_SAMPLE_STRIDE - 1, EIGENVALUE_SAMPLE_STRIDE):
+        programs = [stiff] * (2 * EIGENVALUE_SAMPLE_STRIDE)
         programs[place] = soft
         answer = Answer(np.array([0.5, 0.0]), True, z_box=np.zeros(2))
         found = residuals(Stack(programs, [answer] * len(programs)))

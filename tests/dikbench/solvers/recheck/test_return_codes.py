@@ -12,7 +12,7 @@ import pytest
 from dikbench.arrays import Array
 from dikbench.plugins.building import make_scenario
 from dikbench.problem import DikProblem, Solve
-from dikbench.programs.quadratic_program import Program, QuadraticProgram
+from dikbench.programs.quadratic_program import ProgramKind, QuadraticProgram
 from dikbench.report.tables.return_codes import return_codes
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
@@ -71,7 +71,7 @@ def test_others_say_that_there_is_no_answer(selector: str) -> None:
 class HardEquality:
     """The primary task as an equality, whatever the robot can do."""
 
-    program: ClassVar[Program] = "qp"
+    program: ClassVar[ProgramKind] = "qp"
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

@@ -11,7 +11,7 @@ import pytest
 
 from dikbench import SphereObstacle
 from dikbench.metrics import METRICS, motion_of
-from dikbench.metrics.constraints import CONSTRAINTS
+from dikbench.metrics.distance_and_torque import CONSTRAINTS
 from dikbench.problem.constraints import CollisionConstraint, Constraint, TorqueConstraint
 from dikbench.problem.tasks import PoseTask
 from dikbench.robots.catalogue import load_robot
