@@ -330,6 +330,7 @@ from dataclasses import dataclass
 @dataclass(frozen=True)
 class Spin:
     def velocity(self, problem, solve):
+        open("spinning", "w").close()
         while True:
             pass
 """
@@ -347,11 +348,15 @@ def test_no_worker_outlives_its_driver(tmp_path: Path, how: signal.Signals) -> N
         stdout=subprocess.DEVNULL,
         cwd=tmp_path,
     )
-    time.sleep(8)
-    assert len(_processes_in(tmp_path)) >= 2
+    for _ in range(1200):
+        if (tmp_path / "spinning").exists() or process.poll() is not None:
+            break
+        time.sleep(0.1)
+    at_work = _processes_in(tmp_path)
     process.send_signal(how)
-    process.wait(timeout=30)
-    for _ in range(100):
+    process.wait(timeout=60)
+    assert len(at_work) >= 2
+    for _ in range(300):
         if not _processes_in(tmp_path):
             break
         time.sleep(0.1)
