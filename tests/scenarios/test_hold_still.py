@@ -97,7 +97,7 @@ def test_postures_that_are_not_near_are_refused(monkeypatch: pytest.MonkeyPatch)
         "load_robot",
         lambda name, frame: load_robot(name).with_limits(position=None),
     )
-    with pytest.raises(DikbenchError, match="robot ur5 has no limits"):
+    with pytest.raises(DikbenchError, match="robot ur5 has no position limits"):
         make_scenario("hold-still[robot=ur5,posture=limit]")
 
 

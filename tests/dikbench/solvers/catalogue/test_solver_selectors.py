@@ -159,7 +159,7 @@ def test_the_catalogue_is_consistent() -> None:
     for name, back_end in BACK_ENDS.items():
         assert back_end.interfaces
         assert set(back_end.interfaces) <= set(get_args(Interface)), name
-        assert set(back_end.ours) <= set(back_end.settings), name
+        assert set(back_end.own_defaults) <= set(back_end.settings), name
         assert ("lp" in back_end.programs) == (not back_end.no_lp), name
     for program, name in DEFAULT_SOLVER.items():
         assert why_not(parse_solver(name), program) == ""
