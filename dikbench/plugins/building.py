@@ -142,8 +142,8 @@ def _values(what: str, parameters: Mapping[str, Parameter], selector: Selector) 
         try:
             values[name] = msgspec.convert(text, parameter.type, strict=False)
         except (msgspec.ValidationError, TypeError) as error:  # a TypeError: no text converts to it
-            valid = f"valid: {parameter.valid}" if parameter.choices else str(error)
-            raise DikbenchError(f"{what}: {name}={text!r} is not valid: {valid}") from None
+            why = f"; valid: {parameter.valid}" if parameter.choices else f": {error}"
+            raise DikbenchError(f"{what}: {name}={text!r} is not valid{why}") from None
     return values
 
 

@@ -155,7 +155,7 @@ def test_a_law_from_a_file(law_file: Path) -> None:
     [
         ("{file}:Mien", ["unknown class 'Mien' in {file}", "did you mean 'Mine'?"]),
         ("{file}:NotALaw", ["{file}: formulation 'NotALaw' has no method velocity"]),
-        ("{file}:Mine[side=up]", ["side='up' is not valid: valid: left, right"]),
+        ("{file}:Mine[side=up]", ["side='up' is not valid; valid: left, right"]),
         ("{file}:Mine[size=1]", ["'size'", "valid: careful, count, gain, side"]),
         ("{file}:", ["unknown class ''"]),
         ("{folder}/other.py:Mine", ["formulation file not found: {folder}/other.py"]),
