@@ -377,7 +377,7 @@ def test_a_limit_that_cannot_be_reached_fails_loudly(monkeypatch: pytest.MonkeyP
 @pytest.mark.parametrize("name", CLOSED)
 def test_a_negative_seed_is_an_error(name: str) -> None:
     """Random generators take none."""
-    with pytest.raises(DikbenchError, match="seed -1 must be at least 0"):
+    with pytest.raises(DikbenchError, match="seed -1 must not be negative"):
         make_scenario(name, -1)
 
 
