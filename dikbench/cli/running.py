@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from numbers import Integral
 from pathlib import Path
+from typing import Any, get_args
 
 from msgspec.structs import asdict
 
+from dikbench.errors import DikbenchError, unknown
+from dikbench.parameters import Range
 from dikbench.report.write import write_report
 from dikbench.results.reading import Results, load_results
 from dikbench.run.pool import available_cores
 from dikbench.run.runner import RunSettings
 from dikbench.run.runner import run_study as run_selected
 from dikbench.run.trial_row import TracePolicy
+from dikbench.scenario.plant import REFERENCE_MODES
 from dikbench.study.study import DEFAULT_STUDY, Selection, Study, load_study, select
 
 Selectors = str | Iterable[str]
+
+_LEAST_ONE = Range(1)
 
 
 def run_study(
@@ -24,7 +31,7 @@ def run_study(
     formulations: Selectors = (),
     scenarios: Selectors = (),
     solvers: Selectors = (),
-    seeds: Iterable[int] = (),
+    seeds: int | Iterable[int] = (),
     plants: Selectors = (),
     references: Selectors = (),
     out: str | Path | None = None,
@@ -68,14 +75,21 @@ def run_study(
         DikbenchError: if the study, a selector or the folder is not valid.
         Interrupted: if the user stops the run; what is finished is kept.
     """
+    if jobs is not None:
+        _LEAST_ONE.check("jobs", jobs)
+    _LEAST_ONE.check("trial_memory", trial_memory)
+    Range(above=0.0, unit="s").check("trial_timeout", trial_timeout)
+    _check_choice("traces", traces, get_args(TracePolicy))
     selection = Selection(
-        formulations=_texts(formulations),
-        scenarios=_texts(scenarios),
-        solvers=_texts(solvers),
-        seeds=tuple(seeds),
-        plants=_texts(plants),
-        references=_texts(references),
+        formulations=_texts("formulations", formulations),
+        scenarios=_texts("scenarios", scenarios),
+        solvers=_texts("solvers", solvers),
+        seeds=_seeds(seeds),
+        plants=_texts("plants", plants),
+        references=_texts("references", references),
     )
+    for reference in selection.references:
+        _check_choice("references", reference, REFERENCE_MODES)
     chosen = selected(None if study is None else str(study), selection)
     settings = RunSettings(jobs or available_cores(), trial_timeout, trial_memory, traces, rerun)
     folder = results_folder(chosen, out)
@@ -96,5 +110,25 @@ def results_folder(study: Study, out: str | Path | None) -> Path:
     return Path(out) if out is not None else Path("runs") / study.name
 
 
-def _texts(given: Selectors) -> tuple[str, ...]:
-    return (given,) if isinstance(given, str) else tuple(map(str, given))
+def _texts(axis: str, given: Selectors) -> tuple[str, ...]:
+    texts = (given,) if isinstance(given, str) else tuple(given)
+    for text in texts:
+        if not isinstance(text, str):
+            raise DikbenchError(
+                f"{axis}: expected selectors as text, such as 'dls[damping=0.1]' or "
+                f"'path/to/file.py:Class', got {text!r}"
+            )
+    return texts
+
+
+def _seeds(given: Any) -> tuple[int, ...]:
+    seeds = (given,) if isinstance(given, Integral) else tuple(given)
+    for seed in seeds:
+        if not isinstance(seed, Integral) or isinstance(seed, bool) or seed < 0:
+            raise DikbenchError(f"seeds: expected integers of at least 0, got {seed!r}")
+    return tuple(map(int, seeds))
+
+
+def _check_choice(name: str, given: object, valid: Iterable[str]) -> None:
+    if given not in tuple(valid):
+        raise unknown(name, given, valid)

@@ -16,6 +16,8 @@ import pandas as pd
 from dikbench.errors import DikbenchError
 from dikbench.metrics import METRICS
 from dikbench.results.columns import KEYS, RENAMED, TIMED, TIMES, TRIAL
+from dikbench.scenario.oracle import ORACLE
+from dikbench.study.identity import timing_id
 from dikbench.study.plan import PlannedTrial
 from dikbench.study.trial import Trial
 
@@ -124,9 +126,22 @@ class Store:
 
     def _place(self, planned: Sequence[PlannedTrial]) -> None:
         self._database.execute("UPDATE trials SET position = NULL")
+        # A trial that was selected in other words before (a default spelt out) takes today's.
+        named = ", ".join(f"{name} = ?" for name in TRIAL)
         self._database.executemany(
-            "UPDATE trials SET position = ?, superseded = 0 WHERE id = ?",
-            [(number, trial.id) for number, trial in enumerate(planned)],
+            f"UPDATE trials SET {named}, position = ?, superseded = 0 WHERE id = ?",
+            [(*p.trial.row.values(), number, p.id) for number, p in enumerate(planned)],
+        )
+        timed = {
+            tuple(p.trial.row[name] for name in TIMED): timing_id(
+                p.trial.formulation, p.trial.solver, p.trial.scenario
+            )
+            for p in planned
+            if p.trial.formulation.name != ORACLE
+        }
+        self._database.executemany(
+            "UPDATE OR REPLACE times SET formulation = ?, solver = ?, scenario = ? WHERE id = ?",
+            [(*selectors, name) for selectors, name in timed.items()],
         )
         rows = self._database.execute(
             f"SELECT id, {', '.join(TRIAL)} FROM trials WHERE position IS NULL AND NOT superseded"

@@ -7,9 +7,14 @@ import subprocess
 import sys
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
+
+import pytest
 
 import dikbench
 from dikbench.problem import tasks
+from dikbench.report.comparison.matching import match_trials
+from dikbench.report.sentences.limitations import missing
 
 
 def test_every_public_name_is_there() -> None:
@@ -60,3 +65,47 @@ def test_tasks_of_the_readme_are_public() -> None:
     for name in named:
         assert getattr(dikbench, name) is getattr(tasks, name)
         assert name in dikbench.__all__
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"references": "phase"}, "unknown references 'phase'; valid: path, time"),
+        ({"trial_timeout": -1}, "trial_timeout=-1 must be"),
+        ({"trial_memory": 0}, "trial_memory=0 must be"),
+        ({"jobs": 0}, "jobs=0 must be"),
+        ({"traces": "some"}, "unknown traces 'some'"),
+        ({"seeds": ["a"]}, "seeds: expected integers of at least 0, got 'a'"),
+        ({"seeds": -1}, "seeds: expected integers of at least 0, got -1"),
+        ({"formulations": [3]}, "formulations: expected selectors as text"),
+    ],
+)
+def test_run_study_refuses_what_the_command_line_refuses(
+    tmp_path: Path, arguments: dict[str, Any], said: str
+) -> None:
+    """One line, before anything runs."""
+    with pytest.raises(dikbench.DikbenchError) as caught:
+        dikbench.run_study(out=tmp_path / "out", **arguments)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_trial_in_other_words_is_the_same_trial(tmp_path: Path) -> None:
+    """A default that is spelt out: not run twice, not missing, and matched in comparisons."""
+    plain: dict[str, Any] = {"formulations": "dls", "scenarios": "reach[duration=0.2]"}
+    spelt: dict[str, Any] = {
+        "formulations": "dls[damping=0.05]",
+        "scenarios": "reach[robot=panda,duration=2e-1]",
+    }
+    how: dict[str, Any] = {"plants": "ideal", "jobs": 1, "report": False}
+    one = dikbench.run_study(**plain, **how, out=tmp_path / "one")
+    again = dikbench.run_study(**spelt, **how, out=tmp_path / "one")
+    assert list(again.trials["id"]) == list(one.trials["id"])
+    assert list(again.trials["formulation"]) == ["dls[damping=0.05]"]
+    assert missing(again.trials, again.manifest) == 0
+    assert again.trials["formulation_time_median_us"].notna().all()
+    other = dikbench.run_study(**plain, **how, out=tmp_path / "other")
+    matched = match_trials(again.trials, other.trials)
+    assert len(matched.a) == 1
+    assert len(matched.only_a) == len(matched.only_b) == 0

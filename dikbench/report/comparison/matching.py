@@ -89,6 +89,7 @@ def match_trials(
         DikbenchError: if one is empty or holds a trial twice, or they have no trial or no metric in
             common.
     """
+    b = _in_the_words_of(a, b)
     for rows, name in zip((a, b), names, strict=True):
         if rows.empty:
             raise DikbenchError(f"{name} holds no trials")
@@ -111,6 +112,20 @@ def match_trials(
         metrics,
         _unmatched_columns(a, b),
     )
+
+
+def _in_the_words_of(a: pd.DataFrame, b: pd.DataFrame) -> pd.DataFrame:
+    """Return B, its trials that have an id of A's selected in the words of A.
+
+    The same trial may be selected in other words, with a default spelt out for example.
+    """
+    if "id" not in a or "id" not in b:
+        return b
+    words = a.drop_duplicates("id").set_index("id")[TRIAL]
+    same = b["id"].isin(words.index)
+    renamed = b.copy()
+    renamed.loc[same, TRIAL] = words.loc[b.loc[same, "id"]].to_numpy()
+    return renamed.astype({"seed": b["seed"].dtype})
 
 
 def trial_name(row: Mapping[Any, Any]) -> str:
