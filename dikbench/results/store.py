@@ -15,13 +15,21 @@ import pandas as pd
 
 from dikbench.errors import DikbenchError
 from dikbench.metrics import METRICS
-from dikbench.results.columns import KEYS, RENAMED, TIMED, TIMES, TRIAL
+from dikbench.results.columns import (
+    KEYS,
+    REDEFINED,
+    RENAMED_METRICS,
+    RENAMED_TIMES,
+    TIMED,
+    TIMES,
+    TRIAL,
+)
 from dikbench.study.plan import PlannedTrial
 from dikbench.study.trial import Trial
 
-SCHEMA: Final = 2
-"""Version of the tables below. A store of version 1, whose times have other names, is renamed when
-it is opened; another one is not read."""
+SCHEMA: Final = 3
+"""Version of the tables below. In a store of version 1, whose times have other names, or of version
+2, whose metrics have, they are renamed when it is opened; another one is not read."""
 
 NUMBERS: Final = (*METRICS, "wall_time_s", "control_time_s")
 
@@ -286,8 +294,8 @@ class Store:
             columns = [row[1] for row in self._database.execute("PRAGMA table_info(trials)")]
         except sqlite3.DatabaseError as error:
             raise DikbenchError(f"store {self.path}: not a store of dikbench: {error}") from None
-        if found.get("schema") == "1":
-            self._rename_times()
+        if found.get("schema") in {"1", "2"}:
+            columns = self._migrate(columns, times=found["schema"] == "1")
         elif found.get("schema") != str(SCHEMA):
             raise OtherVersion(
                 f"store {self.path}: schema version {found.get('schema')!r} is not known; this "
@@ -302,12 +310,23 @@ class Store:
         for name in missing:
             self._database.execute(f"ALTER TABLE trials ADD COLUMN {name} REAL")
 
-    def _rename_times(self) -> None:
-        """Give the columns of times that version 1 wrote today's names."""
+    def _migrate(self, columns: Sequence[str], *, times: bool) -> list[str]:
+        """Bring the tables of an earlier version to today's; the columns of trials afterwards.
+
+        Metrics and, of version 1, times get their names of today; what metrics of another
+        definition hold is emptied, to be recomputed.
+        """
+        renamed = {old: new for old, new in RENAMED_METRICS.items() if old in columns}
         with self._guarded(), self._transaction():
-            for old, new in RENAMED.items():
+            for old, new in renamed.items():
+                self._database.execute(f"ALTER TABLE trials RENAME COLUMN {old} TO {new}")
+            for name in REDEFINED:
+                if name in columns:
+                    self._database.execute(f"UPDATE trials SET {name} = NULL")
+            for old, new in RENAMED_TIMES.items() if times else ():
                 self._database.execute(f"ALTER TABLE times RENAME COLUMN {old} TO {new}")
             self._database.execute("UPDATE meta SET value = ? WHERE key = 'schema'", [str(SCHEMA)])
+        return [renamed.get(name, name) for name in columns]
 
     def _check_untouched(self) -> None:
         """A file that is removed or cut under an open database takes rows without a word."""

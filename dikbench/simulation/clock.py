@@ -1,4 +1,4 @@
-"""Clocks: how a reference moves on during a trial, with time or with the progress achieved."""
+"""Clocks: how a reference moves on during a trial, with time or with the robot."""
 
 from __future__ import annotations
 
@@ -6,16 +6,15 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, Final, Literal, Protocol
 
-import numpy as np
+import pinocchio as pin
 
 from dikbench.arrays import Array
-from dikbench.problem.progress import progress, row_weights
 from dikbench.scenario.scenario import Scenario
 
 ReferenceMode = Literal["time", "path"]
 
-LONGEST_PATH_RUN: Final = 5
-"""A path-indexed run ends with its path, or after this many times its nominal duration."""
+LOOK_BACK_S: Final = 0.1
+"""The nearest point of the path is looked for from so long before the target on [s]."""
 
 PATH_END_TOLERANCE: Final = 1e-9
 """A path has ended when at most this share of it is left."""
@@ -43,14 +42,8 @@ class Clock(Protocol):
         """Placement (`pinocchio.SE3`) and body twist (`pinocchio.Motion`) of the reference."""
         ...
 
-    def advance(self, wanted: Array, jacobian: Array, applied: Array) -> None:
-        """Move on after a control step.
-
-        Args:
-            wanted: desired twist V of the tracking task, (m,) [m/s; rad/s].
-            jacobian: its Jacobian J, (m, nv).
-            applied: the velocity that the plant applied, (nv,) [rad/s or m/s].
-        """
+    def advance(self, q: Array) -> None:
+        """Move on after a control step that ended in the configuration q (nq,)."""
         ...
 
 
@@ -72,43 +65,58 @@ class TimeClock:
         target: tuple[Any, Any] = self._targets[self._step]
         return target
 
-    def advance(self, wanted: Array, jacobian: Array, applied: Array) -> None:
+    def advance(self, q: Array) -> None:
         """Move on by one control period (see `Clock`)."""
         self._step += 1
         self.tau = self._step * self._dt
 
 
 class PathClock:
-    """Waits for the robot: moves on by the share of the desired motion that was made.
+    """Waits for the robot: follows the nearest point of the path, at most at the nominal pace.
 
-    tau <- tau + dt min(max(alpha, 0), 1) with alpha = <J v, V>/|V|^2 (see `progress`); where no
-    motion is desired (a dwell) it moves on by dt.
+        tau <- min(tau + dt, max(tau, tau_near + dt))
+
+    with tau_near the nominal time of the path's nearest point to where the task frame is after the
+    step, in position and orientation (see `Embedding`), among those of
+    [tau - `LOOK_BACK_S`, tau + 2 dt]; the latest of equally near ones. An exact motion moves at the
+    nominal pace, and so does one that is late by less than a control period; a dwell, whose points
+    are all equally near, passes in full.
     """
 
     def __init__(self, scenario: Scenario) -> None:
+        assert scenario.embedded_path is not None
         self.tau = 0.0
-        self.most_steps = LONGEST_PATH_RUN * scenario.steps
+        self.most_steps = max(1, round(scenario.longest_path_run * scenario.steps))
         self._step, self._dt, self._target = 0, scenario.dt, scenario.target
         self._duration = scenario.reference.duration
-        self._weights = row_weights(scenario.rows)
+        self._path, self._embedding = scenario.embedded_path, scenario.embedding
+        self._frame, self._model = scenario.robot.frame_id, scenario.robot.model
+        self._data = self._model.createData()
 
     @property
     def is_over(self) -> bool:
-        """Whether the path has ended, or `LONGEST_PATH_RUN` durations have passed."""
-        there = self.tau >= self._duration * (1 - PATH_END_TOLERANCE)
-        return there or self._step == self.most_steps
+        """Whether the path has ended, or the scenario's `longest_path_run` is over."""
+        return path_has_ended(self.tau, self._duration) or self._step == self.most_steps
 
     def target(self) -> tuple[Any, Any]:
         """See `Clock`."""
         return self._target(self.tau)
 
-    def advance(self, wanted: Array, jacobian: Array, applied: Array) -> None:
-        """Move on by the progress achieved (see `Clock`)."""
-        achieved = jacobian @ applied
-        alpha = float(progress(wanted[None], achieved[None], self._weights)[0])
-        share = 1.0 if np.isnan(alpha) else min(max(alpha, 0.0), 1.0)
+    def advance(self, q: Array) -> None:
+        """Move on to where the robot has come, at most by one control period (see `Clock`)."""
+        pin.forwardKinematics(self._model, self._data, q)
+        X = pin.updateFramePlacement(self._model, self._data, self._frame)
+        point = self._embedding.points(X.rotation[None], X.translation[None])[0]
+        first, last = self.tau - LOOK_BACK_S, self.tau + 2 * self._dt
+        near = self._path.latest_nearest(point, max(first, 0.0), min(last, self._duration))
+        ahead = min(self.tau + self._dt, max(self.tau, near + self._dt))
         self._step += 1
-        self.tau = min(self.tau + self._dt * share, self._duration)
+        self.tau = min(ahead, self._duration)
+
+
+def path_has_ended(tau: float, duration: float) -> bool:
+    """Return whether a nominal time [s] is the end of a path of this nominal duration [s]."""
+    return tau >= duration * (1 - PATH_END_TOLERANCE)
 
 
 CLOCKS: Final[Mapping[ReferenceMode, type[Clock]]] = MappingProxyType(

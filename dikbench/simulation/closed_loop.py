@@ -84,7 +84,7 @@ def simulate(
         formulation: the law under test.
         solve: its solver.
         plant: what the formulation sees of the robot, and what becomes of a commanded velocity.
-        mode: whether the reference moves on with the clock or with the progress achieved.
+        mode: whether the reference moves on with the clock or waits for the robot.
         seed: of the plant's noise.
 
     Returns:
@@ -127,12 +127,12 @@ def simulate(
             steps.append(
                 _Step(q, clock.tau, wanted, jacobian, v, applied, answer.status, problem.relaxed)
             )
-            clock.advance(wanted, jacobian, applied)
             q, v_prev = read_only(pin.integrate(robot.model, q, applied * dt)), applied
+            clock.advance(q)
     except TrialEnded as ended:
         status, message = ended.status, f"step {len(steps)}: {ended}"
     jacobians = _joined([step.jacobian for step in steps], len(scenario.rows), robot.nv)
-    trace = _trace(scenario, steps, q, clock.tau, jacobians, solve.rechecked())
+    trace = _trace(scenario, steps, q, clock.tau, jacobians, solve.rechecked(), mode)
     return Run(trace, status, message, kinematics_ns, formulation_ns, jacobians)
 
 
@@ -143,6 +143,7 @@ def _trace(
     tau: float,
     jacobians: Array,
     rechecked: RecheckedSteps,
+    mode: ReferenceMode,
 ) -> Trace:
     """Make the trace of steps that ended in q at tau; those that went nowhere become `stuck`."""
     n, nv, m = len(steps), scenario.robot.nv, len(scenario.rows)
@@ -169,6 +170,7 @@ def _trace(
         rechecked.dual[:n],
         rechecked.gap[:n],
         rechecked.distance[:n],
+        mode,
     )
 
 

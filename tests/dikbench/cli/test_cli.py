@@ -171,7 +171,7 @@ def test_a_law_in_a_file_runs_without_packaging(tmp_path: Path) -> None:
         ("near-miss[miss=0.05]", "required speed over limit"),
         ("osqp", "eps_abs"),
         ("panda", "panda_hand_tcp"),
-        ("off_course_max_rad", "unit: rad"),
+        ("direction_error_max_rad", "unit: rad"),
         ("quick", "[[cells]]"),
     ],
 )

@@ -135,7 +135,7 @@ ERRORS = (0, _chord(0.1), _chord(0.1), _chord(0.2), _chord(0.2))
         ("null_space_drift_per_lap_rad", math.nan),
         ("recovery_time_s", math.inf),
         ("path_length_m", 2 * _chord(0.1) + _chord(0.2)),
-        ("off_course_max_rad", math.pi),
+        ("direction_error_max_rad", math.pi),
         ("progress_mean", (1.0 - 2.0 + 0.5 + 0.0) / 4),
         ("progress_min", -2.0),
         ("velocity_peak_ratio", 2.0 / 1.5),
@@ -194,7 +194,7 @@ def test_a_slant_of_the_motion_is_its_largest_angle() -> None:
     # Achieved (0.4, 0.5, 1), weighted (0.4, 0.5, 0.2); wanted the translation alone.
     trace = _trace([1.0, 1.0], [[0.4, 0.5, 0.0], [0.4, 0.5, 1.0]], [Status.OK, Status.OK])
     got = evaluate(motion_of(trace, _scenario()))
-    assert got["off_course_max_rad"] == pytest.approx(math.acos(math.sqrt(0.41 / 0.45)))
+    assert got["direction_error_max_rad"] == pytest.approx(math.acos(math.sqrt(0.41 / 0.45)))
     assert got["progress_min"] == pytest.approx(1.0)
     assert got["stuck_share"] == 0.0
 
@@ -319,7 +319,7 @@ def test_a_run_that_only_dwells_has_no_progress() -> None:
     got = evaluate(motion_of(trace, _scenario()))
     assert math.isnan(got["progress_mean"])
     assert math.isnan(got["progress_min"])
-    assert math.isnan(got["off_course_max_rad"])
+    assert math.isnan(got["direction_error_max_rad"])
 
 
 def test_a_run_that_stands_still_makes_no_progress() -> None:
@@ -327,7 +327,7 @@ def test_a_run_that_stands_still_makes_no_progress() -> None:
     trace = _trace([0.0, 0.0], [[0.4, 0.5, 1.0]] * 2, [Status.STUCK] * 2)
     got = evaluate(motion_of(trace, _scenario()))
     assert got["progress_mean"] == 0.0
-    assert math.isnan(got["off_course_max_rad"])
+    assert math.isnan(got["direction_error_max_rad"])
     assert got["stuck_share"] == 1.0
 
 
