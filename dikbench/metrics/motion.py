@@ -109,7 +109,8 @@ class Motion:
         Of several frames of the first priority the one that is farthest from its target counts.
         """
         away = np.linalg.norm(self.points - self.target_points, axis=1)
-        return np.maximum(away, self._held_apart[0])
+        farthest: Array = np.maximum(away, self._held_apart[0])
+        return farthest
 
     @cached_property
     def contour_error_6d(self) -> Array:
@@ -121,7 +122,8 @@ class Motion:
         path = self.scenario.embedded_path
         if path is None:
             return self.tracking_error
-        return np.maximum(self.nearest_on_path[0], self._held_apart[0])
+        away: Array = np.maximum(self.nearest_on_path[0], self._held_apart[0])
+        return away
 
     @cached_property
     def nearest_on_path(self) -> tuple[Array, Indices, Array]:

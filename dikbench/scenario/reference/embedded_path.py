@@ -93,7 +93,8 @@ class EmbeddedPath:
         """
         middles, reaches, pieces = self._blocks
         away = cdist(points, self.points[middles])
-        each, first = np.arange(len(points)), away.argmin(axis=1)
+        each = np.arange(len(points))
+        first: Indices = away.argmin(axis=1)
         squares, nearest, shares = self._nearest_of(points, pieces[first])
         # Another block may only come nearer if its ball does.
         away -= reaches
@@ -103,11 +104,11 @@ class EmbeddedPath:
         if len(which):
             found = self._nearest_of(points[which], pieces[blocks])
             order = np.lexsort((found[0], which))
-            which, begins = np.unique(which[order], return_index=True)
+            asking, begins = np.unique(which[order], return_index=True)
             best = order[begins]
-            nearer = found[0][best] < squares[which]
-            which, best = which[nearer], best[nearer]
-            squares[which], nearest[which], shares[which] = (part[best] for part in found)
+            nearer = found[0][best] < squares[asking]
+            asking, best = asking[nearer], best[nearer]
+            squares[asking], nearest[asking], shares[asking] = (part[best] for part in found)
         return np.sqrt(squares), nearest, shares
 
     def _nearest_of(self, points: Array, pieces: Indices) -> tuple[Array, Indices, Array]:
@@ -166,7 +167,8 @@ class EmbeddedPath:
         The foot on a piece without length is its end.
         """
         resting = self.squares <= TIE_M**2
-        return np.where(resting, 0.0, 1 / np.where(resting, 1.0, self.squares)), 1.0 * resting
+        scale: Array = np.where(resting, 0.0, 1 / np.where(resting, 1.0, self.squares))
+        return scale, resting.astype(float)
 
     def tangents(self, pieces: Indices, shares: Array) -> Array:
         """Interpolate the unit tangent at points of pieces, linearly between their middles.

@@ -20,6 +20,7 @@ from dikbench.scenario.certificate import Certificate
 from dikbench.scenario.reference.curves import circle, lemniscate
 from dikbench.scenario.reference.path import ReferencePath, reference_path
 from dikbench.scenario.reference.reference import Reference, target_at_rest
+from dikbench.simulation.clock import ReferenceMode
 from dikbench.simulation.trace import Trace
 
 DT = 0.01
@@ -70,6 +71,7 @@ def of(
     """The motion of a frame that is at place(t) at the trace time t; 0.01 s per step."""
     n = round(reference.duration / DT)
     t = DT * np.arange(n + 1)
+    mode: ReferenceMode = "time" if tau is None else "path"
     tau = t if tau is None else tau
     translations = np.array([place(time) for time in t])
     targets = np.array([reference.placement(each).translation for each in tau.tolist()])
@@ -77,7 +79,7 @@ def of(
     rows = 6 if tracking is None else 3
     trace = Trace(
         DT, np.tile(ROBOT.q0, (n + 1, 1)), tau, np.zeros((n, rows)), v, v, steps, steps, steps - 1,
-        steps - 1, np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n),
+        steps - 1, np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), mode,
     )  # fmt: skip
     scenario = Scenario(
         ROBOT, ROBOT.q0, v[0], reference, tracking or PoseTask(), DT, reference.duration,
@@ -87,7 +89,9 @@ def of(
     if tracking is not None:
         position = np.full(n + 1, np.nan)
     jacobians = np.tile(np.eye(rows, 7), (n + 1, 1, 1))
-    return Motion(trace, scenario, translations, position, np.zeros(n + 1), jacobians)
+    turned = np.array([reference.placement(each).rotation for each in tau.tolist()])
+    x, x_d = (scenario.embedding.points(turned, p) for p in (translations, targets))
+    return Motion(trace, scenario, translations, position, np.zeros(n + 1), jacobians, x, x_d)
 
 
 def on(reference: Reference, delay: float = 0.0, shift: Array | None = None) -> Place:
@@ -292,8 +296,7 @@ def test_the_nearest_piece_may_end_farther_away_than_many_vertices() -> None:
     """The middle of a long piece, 1 mm away, among short ones at more than 1.2 mm."""
     short = np.array([[0.0, 2.2e-3 + 1e-5 * k, 0.0] for k in range(40)])
     vertices = np.vstack([[[-2.5e-3, 0, 0], [2.5e-3, 0, 0]], short])
-    arcs = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(vertices, axis=0), axis=1)))
-    path = ReferencePath(arcs, arcs, arcs, vertices, arcs, len(vertices) - 1)
+    path = ReferencePath(vertices, len(vertices) - 1)
     assert path.distances(np.array([[-5e-4, 1e-3, 0.0]])) == pytest.approx(1e-3, abs=1e-12)
 
 
