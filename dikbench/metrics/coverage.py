@@ -110,7 +110,7 @@ class Coverage:
         asked = {sample for sample, _ in possible.values()}
         known, needed, sample = [0], np.zeros(1), -1
         for near, distances in self._blocks:
-            if sample == last:
+            if sample == last or not near:
                 break
             # By an instant between two that come near, what the one before allows is needed.
             before = np.searchsorted(known, near, side="right") - 1

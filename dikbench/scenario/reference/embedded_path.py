@@ -124,12 +124,12 @@ class EmbeddedPath:
         The number of a sample in the middle of each, (b,); how far its pieces are from that one at
         most, (b,) [m]; and their numbers, (b, m).
         """
-        pieces = np.flatnonzero(self.squares[: self.once] > 0)
-        if not len(pieces):
-            pieces = np.zeros(1, dtype=int)
-        count = -(-len(pieces) // PIECES_PER_BLOCK)
-        pieces = np.pad(pieces, (0, count * PIECES_PER_BLOCK - len(pieces)), mode="edge")
-        pieces = pieces.reshape(count, PIECES_PER_BLOCK)
+        long = np.flatnonzero(self.squares[: self.once] > 0)
+        if not len(long):
+            long = np.zeros(1, dtype=int)
+        count = -(-len(long) // PIECES_PER_BLOCK)
+        places = np.arange(count * PIECES_PER_BLOCK).reshape(count, PIECES_PER_BLOCK)
+        pieces: Indices = long[np.minimum(places, len(long) - 1)]
         middles = pieces[:, PIECES_PER_BLOCK // 2]
         ends = np.stack([self.points[pieces], self.points[pieces + 1]])
         away = np.linalg.norm(ends - self.points[middles][:, None], axis=3)

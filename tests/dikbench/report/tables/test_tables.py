@@ -339,7 +339,11 @@ def test_a_failure_where_nothing_is_measured_does_not_disqualify_the_others() ->
         direction_error_max_rad=[0.1, np.nan, 0.2, np.nan, 0.3, np.nan],
     )
     table = make_table(TRACKING_ERROR, trials)
-    for key in ("contour_error_max_m_worst", "direction_error_max_rad", "direction_error_max_rad_worst"):
+    for key in (
+        "contour_error_max_m_worst",
+        "direction_error_max_rad",
+        "direction_error_max_rad_worst",
+    ):
         assert _best(table, key) == {"b none"}, key
 
 
