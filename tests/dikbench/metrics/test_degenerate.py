@@ -158,7 +158,8 @@ def test_a_robot_at_rest_is_smooth_and_late() -> None:
     assert got["energy_above_10_hz_share"] == 0.0
     assert math.isnan(got["jerk_rms_scaled"])
     assert math.isnan(got["sparc"])
-    assert got["lag_final_s"] == pytest.approx(90 * still.dt)
+    # Of the path it has what is within the tolerance of its start.
+    assert got["lag_final_s"] == pytest.approx(90 * still.dt, abs=still.dt)
     assert got["contour_error_max_m"] < 1e-9
 
 
