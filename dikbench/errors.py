@@ -1,4 +1,4 @@
-"""Errors: one root, one line each: what was wrong, where, and what would have been valid."""
+"""Errors, one line each: what was wrong, where, and what would have been valid."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ class DikbenchError(Exception):
 class CannotAnswer(DikbenchError):
     """A formulation or a solver has no velocity for this control step.
 
-    Raised by a law or by the `solve` it was handed; the harness then applies the fallback and
-    records the status. Nothing else may be raised in normal operation.
+    Raised by a formulation or by its `solve`; the harness then applies the fallback and records the
+    status. A formulation raises nothing else in normal operation.
     """
 
 
@@ -23,7 +23,7 @@ class Infeasible(CannotAnswer):
 
 
 class SolverFailed(CannotAnswer):
-    """The solver gave no answer to a program that has a feasible point."""
+    """The solver has no answer to a program that has a feasible point."""
 
 
 def unknown(what: str, name: object, valid: Iterable[object], where: str = "") -> DikbenchError:

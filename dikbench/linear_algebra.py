@@ -1,4 +1,4 @@
-"""Dense factorisations of the size of a robot arm, through LAPACK without numpy's wrappers."""
+"""Dense linear algebra of small matrices, through LAPACK without numpy's wrappers."""
 
 from __future__ import annotations
 
@@ -12,25 +12,26 @@ from dikbench.arrays import Array
 
 Projector = Literal["exact", "damped"]
 
-ILL_CONDITIONED = 1e-4
-"""Ratio of the pivots of a Gram matrix's triangle below which it is not to be trusted."""
+SMALLEST_PIVOT_RATIO = 1e-4
+"""A Gram matrix whose smallest pivot is a smaller share of its largest is ill-conditioned."""
 
 
 def thin_svd(A: Array) -> tuple[Array, Array, Array]:
-    """U (m, k), singular values (k,) falling, V^T (k, n) of A (m, n), k = min(m, n)."""
+    """Compute U (m, k), falling singular values (k,) and V^T (k, n) of A (m, n), k = min(m, n)."""
     U, singular, Vt, _ = dgesdd(A, full_matrices=0)
     return U, singular, Vt
 
 
 def rank(singular: Array, tolerance: float) -> int:
-    """How many of the singular values (k,), falling, are above a tolerance; NaN counts as above."""
+    """Count the falling singular values (k,) above a tolerance; NaN counts as above."""
     return len(singular) - int(np.count_nonzero(singular <= tolerance))
 
 
 def pseudo_inverse(A: Array, tolerance: float) -> Array:
-    """Moore-Penrose inverse (n, m) of A (m, n), singular values up to `tolerance` taken as zero.
+    """Compute the Moore-Penrose inverse (n, m) of A (m, n).
 
-    The tolerance is absolute, in the units of A: a relative one blows up where A itself vanishes.
+    Singular values up to `tolerance` count as zero. It is absolute, in the units of A: the inverse
+    of a relative one grows without bound where A itself vanishes.
     """
     U, singular, Vt = thin_svd(A)
     k = rank(singular, tolerance)
@@ -39,7 +40,7 @@ def pseudo_inverse(A: Array, tolerance: float) -> Array:
 
 
 def least_norm(A: Array, b: Array, tolerance: float) -> Array:
-    """The shortest least-squares solution of A x = b, (n,): `pseudo_inverse` times b (m,)."""
+    """Compute the shortest least-squares solution (n,) of A x = b: `pseudo_inverse` times b."""
     U, singular, Vt = thin_svd(A)
     k = rank(singular, tolerance)
     x: Array = (b.dot(U[:, :k]) / singular[:k]).dot(Vt[:k])
@@ -47,18 +48,19 @@ def least_norm(A: Array, b: Array, tolerance: float) -> Array:
 
 
 def damped_least_squares(A: Array, b: Array, squared_damping: float) -> Array:
-    """The minimiser (n,) of ||A x - b||^2 + lambda^2 ||x||^2 for A (m, n), b (m,).
+    """Compute the minimiser (n,) of ||A x - b||^2 + lambda^2 ||x||^2 for A (m, n), b (m,).
 
     The smaller of the two Gram matrices is factorised: A A^T where the rows are fewer, else A^T A.
-    Where that would lose more than half of the digits, (almost) undamped at a singularity, the
-    singular values serve instead; undamped where rank is lost, the shortest minimiser.
+    Where that would lose more than half of the digits (at a singularity with hardly any damping)
+    the singular values are used instead. Where rank is lost without damping this is the shortest
+    minimiser.
     """
     m, n = A.shape
     damped = A.dot(A.T) if m <= n else A.T.dot(A)
     damped.flat[:: len(damped) + 1] += squared_damping
     factor, y, info = dposv(damped, b if m <= n else b.dot(A))
     pivots = factor.diagonal().tolist()  # their ratio bounds the condition number, from below
-    if info or min(pivots) < ILL_CONDITIONED * max(pivots):
+    if info or min(pivots) < SMALLEST_PIVOT_RATIO * max(pivots):
         lost = np.finfo(float).eps * max(m, n) * float(np.linalg.norm(A))
         return DampedInverse(A, lost, squared_damping**0.5).times(b)
     x: Array = y.dot(A) if m <= n else y
@@ -67,22 +69,22 @@ def damped_least_squares(A: Array, b: Array, squared_damping: float) -> Array:
 
 @lru_cache(maxsize=64)
 def scaled_identity(n: int, scale: float) -> Array:
-    """The matrix scale I, (n, n), made once: to be read, not written to."""
+    """Return the matrix scale I, (n, n), made once and read-only."""
     matrix: Array = np.eye(n) * scale
     matrix.flags.writeable = False
     return matrix
 
 
 def solve_positive_definite(A: Array, b: Array) -> Array | None:
-    """X with A x = b for a symmetric positive definite A (n, n); None where A is not."""
+    """Solve A x = b for a symmetric positive definite A (n, n); None where A is not."""
     _, x, info = dposv(A, b)
     return x if info == 0 else None
 
 
 def null_space(A: Array, tolerance: float) -> Array:
-    """An orthonormal basis of the null space of A (m, n), as columns (n, n - rank).
+    """Compute an orthonormal basis of the null space of A (m, n), columns (n, n - rank).
 
-    Singular values up to `tolerance` (absolute, in the units of A) are taken as zero.
+    Singular values up to `tolerance` (absolute, in the units of A) count as zero.
     """
     _, singular, Vt, _ = dgesdd(A, full_matrices=1)
     basis: Array = Vt[int(np.count_nonzero(singular > tolerance)) :].T
@@ -92,8 +94,8 @@ def null_space(A: Array, tolerance: float) -> Array:
 class DampedInverse:
     """A^# = A^T (A A^T + lambda^2 I)^-1, (n, m), of a matrix A (m, n), by its singular values.
 
-    Those up to `tolerance` (absolute, in the units of A) are taken as zero. With no damping it is
-    the Moore-Penrose inverse A^+.
+    Singular values up to `tolerance` (absolute, in the units of A) count as zero. Without damping
+    it is the Moore-Penrose inverse A^+.
     """
 
     __slots__ = ("_U", "_Vt", "_damped", "_kept", "_singular")
@@ -104,7 +106,7 @@ class DampedInverse:
         self._damped = self._singular**2 + damping**2
 
     def times(self, b: Array) -> Array:
-        """A^# b, (n,)."""
+        """Compute A^# b, (n,)."""
         gain = np.divide(
             self._singular, self._damped, out=np.zeros_like(self._damped), where=self._kept
         )
@@ -112,11 +114,11 @@ class DampedInverse:
         return x
 
     def taken(self, projector: Projector) -> Array:
-        """What A takes of the space of v, (n, n): I minus it is what A leaves free.
+        """Compute the part of the velocity space that A uses, (n, n); I minus it is left free.
 
         Args:
-            projector: "exact": A^+ A, the orthogonal projector onto the row space of A; "damped":
-                A^# A, which with damping is no projector.
+            projector: "exact" for A^+ A, the orthogonal projector onto the row space of A; "damped"
+                for A^# A, which is not a projector when lambda > 0.
         """
         if projector == "exact":
             share = self._kept.astype(float)
@@ -129,10 +131,10 @@ class DampedInverse:
 
 
 def inverse_and_row_space(A: Array, tolerance: float, damping: float = 0.0) -> tuple[Array, Array]:
-    """The (damped) inverse (n, m) of A (m, n), and an orthonormal basis (r, n) of A's row space.
+    """Compute the (damped) inverse (n, m) of A (m, n) and an orthonormal row basis (r, n).
 
-    Singular values s up to the (absolute) tolerance count as zero, r are above it; their inverse is
-    s / (s^2 + damping^2). I - basis^T basis projects onto the null space of A, damped or not.
+    The r singular values s above the (absolute) tolerance have the inverse s / (s^2 + damping^2),
+    the others count as zero. I - basis^T basis projects onto the null space of A.
     """
     U, singular, Vt, _ = dgesdd(A, full_matrices=0)
     rank = int((singular > tolerance).sum())
@@ -142,9 +144,9 @@ def inverse_and_row_space(A: Array, tolerance: float, damping: float = 0.0) -> t
 
 
 def volume(A: Array) -> float:
-    """The square root of det(A A^T) for A (m, n), the product of its singular values if m <= n.
+    """Compute sqrt(det(A A^T)) of A (m, n), the product of its singular values if m <= n.
 
-    From the triangle R of A^T = Q R: a Gram matrix would lose half of the digits.
+    It is computed from R of A^T = Q R, since a Gram matrix would lose half of the digits.
     """
     m, n = A.shape
     if m > n:

@@ -2,7 +2,7 @@
 
     damping: Annotated[float, Range(0.0), Drawn(1e-3, 0.3, log=True)] = 0.05
 
-The range stands there once: the check, the help, tuning and the drawing of instances read it.
+The range is declared once: the check, the help, tuning and the drawing of instances read it.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ Marker = TypeVar("Marker")
 
 @dataclass(frozen=True)
 class Range:
-    """The numbers that a parameter may be: finite, from `low` to `high`.
+    """The finite numbers, from `low` to `high`, that are valid for a parameter.
 
     Attributes:
         low, high: the least and the largest number.
-        unit: in which they are measured ("rad/s"), for labels and errors.
-        above, below: numbers that must not be reached.
-        also: single numbers that are valid, too.
+        unit: their unit ("rad/s"), for labels and errors.
+        above, below: exclusive bounds.
+        also: single numbers that are valid in addition.
     """
 
     low: float = -inf
@@ -46,7 +46,7 @@ class Range:
     also: tuple[float, ...] = ()
 
     def holds(self, value: Any) -> bool:
-        """Whether a value is a number of this range (NaN and infinity are in none)."""
+        """Say whether a value is a number of this range (NaN and infinity are in none)."""
         if not isinstance(value, Real):
             return False
         number = float(value)
@@ -63,7 +63,7 @@ class Range:
             raise DikbenchError(f"{name}={value} must be {self}")
 
     def __str__(self) -> str:
-        """Say the range in words, with its unit."""
+        """Write the range in words, with its unit."""
         low = f"at least {self.low:g}" if isfinite(self.low) else ""
         low = f"above {self.above:g}" if self.above >= self.low and isfinite(self.above) else low
         high = f"at most {self.high:g}" if isfinite(self.high) else ""
@@ -80,11 +80,11 @@ class Range:
 
 @dataclass(frozen=True)
 class Drawn:
-    """Where a parameter is drawn for instances of a family, or tuned for a formulation.
+    """The range in which a family's parameter is drawn, or a formulation's is tuned.
 
     Attributes:
-        low, high: finite bounds of a number; a choice needs none: each may come.
-        log: whether the logarithm is uniform.
+        low, high: finite bounds of a number; a choice among values needs none.
+        log: whether the logarithm is drawn uniformly.
     """
 
     low: float = nan
@@ -95,7 +95,8 @@ class Drawn:
         """Check the bounds.
 
         Raises:
-            DikbenchError: if they are no interval, or have no logarithm where that is drawn.
+            DikbenchError: if they are not finite with low < high, or not positive where `log` is
+                set.
         """
         if isnan(self.low) and isnan(self.high) and not self.log:
             return
@@ -107,7 +108,7 @@ class Drawn:
             raise DikbenchError(f"Drawn({self.low}, {self.high}): a logarithm needs low > 0")
 
     def __str__(self) -> str:
-        """Say the bounds in words."""
+        """Write the bounds in words."""
         if isnan(self.low):
             return "any of these"
         return f"{self.low:g} to {self.high:g}{', logarithmic' if self.log else ''}"
@@ -115,13 +116,13 @@ class Drawn:
 
 @dataclass(frozen=True)
 class Parameters:
-    """The base of families, formulations and plants: whoever is made is checked.
+    """The base of families, formulations and plants, whose parameters are checked when made.
 
-    A subclass is a frozen dataclass; what spans several fields is checked in `check`.
+    A subclass is a frozen dataclass; its `check` checks conditions on several parameters.
     """
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Refuse what Python would take for something else than its author meant.
+        """Refuse a class body that Python reads differently from what its author meant.
 
         Raises:
             DikbenchError: if a parameter has no type or hides a class variable of a base, or the
@@ -131,15 +132,15 @@ class Parameters:
         _check_body(cls)
 
     def __post_init__(self) -> None:
-        """Check the parameters, each by itself and all together."""
+        """Check each parameter, then the conditions on several of them."""
         check_parameters(self)
         self.check()
 
     def check(self) -> None:
-        """Check what spans several parameters.
+        """Check conditions on several parameters.
 
         Raises:
-            DikbenchError: if they do not go together.
+            DikbenchError: if a condition does not hold.
         """
 
 
@@ -151,8 +152,8 @@ class Parameter:
         name: of the field.
         type: its type, without ranges.
         default: its default; `REQUIRED` where it must be given.
-        range: the numbers that it may be; None where the class says nothing of it.
-        drawn: where it is drawn or tuned; None where it is not.
+        range: the valid numbers; None where the class declares no range.
+        drawn: the range in which it is drawn or tuned; None where it is not.
     """
 
     name: str
@@ -175,12 +176,12 @@ class Parameter:
 
     @property
     def hidden(self) -> bool:
-        """Whether it has one value only: nobody need see it."""
+        """Whether it has one value only, so that lists leave it out."""
         return len(self.choices) == 1
 
     @property
     def valid(self) -> str:
-        """What is valid, in words."""
+        """The valid values, in words."""
         if self.range is not None:
             return str(self.range)
         if self.choices:
@@ -193,7 +194,7 @@ class Parameter:
         """Check a value.
 
         Raises:
-            DikbenchError: if it is not valid; the message says what would be.
+            DikbenchError: if it is not valid; the message says which values are.
         """
         if value is None and NoneType in typing.get_args(self.type):
             return
@@ -209,8 +210,8 @@ def check_parameters(plugin: object) -> None:
     """Check each field of a dataclass against the range in its annotation.
 
     Raises:
-        DikbenchError: naming the first value that is not valid and what would be, or what is wrong
-            with the class.
+        DikbenchError: for the first value that is not valid, or a class that declares its
+            parameters wrongly.
     """
     kind: Any = type(plugin)
     for name, parameter in parameters_of(kind).items():
@@ -219,11 +220,11 @@ def check_parameters(plugin: object) -> None:
 
 @lru_cache(maxsize=1024)
 def parameters_of(plugin: type) -> Mapping[str, Parameter]:
-    """Read the parameters of a dataclass, by name; a class that is none has no parameters.
+    """Read the parameters of a dataclass, by name; any other class has none.
 
     Raises:
-        DikbenchError: if the class is not what its author meant: a missing decorator, a type that
-            cannot be found, a default or a drawn number outside its range.
+        DikbenchError: if the decorator is missing, a type cannot be found, or a default or a bound
+            of `Drawn` is outside the range.
     """
     if issubclass(plugin, Parameters) and "__dataclass_params__" not in vars(plugin):
         raise DikbenchError(f"class {plugin.__qualname__}: write @dataclass(frozen=True) above it")
@@ -270,10 +271,10 @@ def _read(plugin: type, field: dataclasses.Field[Any]) -> Parameter:
 
 
 def _hints(plugin: type, name: str) -> Iterator[Any]:
-    """The types that a class and its bases declare for a field, its own first.
+    """Yield the types that a class and its bases declare for a field, its own first.
 
-    Each is resolved by itself, where it was written: a name that is imported for type checkers only
-    gives None and spoils no other one.
+    Each is resolved by itself in the module that declares it, so that a name imported for type
+    checkers only gives None and does not affect the others.
     """
     for owner in plugin.__mro__:
         written = inspect.get_annotations(owner).get(name)
@@ -288,7 +289,7 @@ def _hints(plugin: type, name: str) -> Iterator[Any]:
 
 
 def _marker(hints: list[Any], kind: type[Marker]) -> Marker | None:
-    """The first marker of a kind in some annotations: a new default keeps the range of a base."""
+    """Return the first marker of a kind: a field with a new default keeps its base's range."""
     for hint in hints:
         for marker in getattr(hint, "__metadata__", ()):
             if isinstance(marker, kind):
@@ -297,7 +298,7 @@ def _marker(hints: list[Any], kind: type[Marker]) -> Marker | None:
 
 
 def _check_body(cls: type) -> None:
-    """Check what a class of parameters says in its own body (see `__init_subclass__`)."""
+    """Check the own body of a class of parameters (see `__init_subclass__`)."""
     own = inspect.get_annotations(cls)
     where = f"class {cls.__qualname__}"
     if "__post_init__" in vars(cls):

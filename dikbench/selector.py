@@ -19,9 +19,9 @@ _FORM = re.compile(r"(?P<name>[^\[\]\s][^\[\]]*?)(\[(?P<parameters>[^\[\]]*)\])?
 
 @dataclass(frozen=True)
 class Selector:
-    """A name and its parameters, as text; parsed once, at the edge, and handed on.
+    """A name and its parameters as texts, parsed once where they enter.
 
-    Selectors are equal where name and parameters are, in whatever order these were given.
+    Selectors with the same name and parameters are equal, whatever the order of the parameters.
 
     Attributes:
         name: what is selected.
@@ -59,7 +59,7 @@ def listed(parameters: Mapping[str, object]) -> str:
 
 
 def parse_selector(text: str | Selector) -> Selector:
-    """Split a selector into its name and its parameters; one that is parsed stays as it is.
+    """Split a selector into its name and its parameters; return a parsed one unchanged.
 
     Raises:
         DikbenchError: if the text has not the form `name[parameter=value,...]`.
@@ -84,10 +84,10 @@ def parse_selector(text: str | Selector) -> Selector:
 
 
 def alternatives(text: str) -> list[Selector]:
-    """Return the selectors, one value per parameter, that a selector with lists stands for.
+    """Return the selectors with one value per parameter that a selector with lists stands for.
 
     `dls[damping=0.01|0.1]` stands for `dls[damping=0.01]` and `dls[damping=0.1]`; several lists
-    make a product, the last one running fastest.
+    make a product, in which the last one varies fastest.
 
     Raises:
         DikbenchError: if the text is no selector, or a value of a list is missing or given twice.

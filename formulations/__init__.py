@@ -1,6 +1,6 @@
-"""The control laws, one per file: (problem, solve) -> velocity.
+"""The formulations, one per file: (problem, solve) -> velocity.
 
-A new law is a file beside these and a line in this table.
+A new formulation is a file in this package and a line in this table.
 """
 
 from __future__ import annotations

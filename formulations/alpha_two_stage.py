@@ -1,4 +1,4 @@
-"""Alpha scaling first, then the posture in what it leaves free."""
+"""Alpha scaling, then the posture in the null space."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from dikbench.problem import (
     Braking,
     DikProblem,
     LimitKind,
-    LinearizedJointTask,
     Parameters,
     ProgramKind,
     QuadraticProgram,
@@ -20,24 +19,25 @@ from dikbench.problem import (
     Solve,
     null_space,
 )
+from formulations.drake import posture_of
 from formulations.lp_alpha import alpha_program
 from formulations.null_space_program import limits_about
 
 
 @dataclass(frozen=True)
 class AlphaTwoStage(Parameters):
-    """Alpha scaling in two stages: as far as the limits allow, then the posture, which cannot leak.
+    """Alpha scaling in two stages: the task as fast as the limits allow, then the posture.
 
         1.  alpha*, v_1 = argmax alpha   s.t.  J v = alpha V,  0 <= alpha <= 1,  lo <= v <= hi
         2.  z* = argmin 1/2 ||v_1 + N z - v_2||^2   s.t.  lo <= v_1 + N z <= hi,   v = v_1 + N z*
 
     J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s; N (nv, nv - rank J)
-    an orthonormal basis of the null space of J; v_2 = gain e the wanted velocity of the problem's
+    an orthonormal basis of the null space of J; v_2 = gain e the desired velocity of the
     posture task, zero where there is none. lo and hi are the velocity box; both stages keep
     G v <= h as well, where the scenario bounds torques and distances. Stage 2 moves in the null
     space only: posed with J v = alpha* V as an equality, solvers find it infeasible by
-    rounding. What Drake's single weighted cost approximates. Never off course and inside every
-    limit; weights play no part.
+    rounding. Drake's single weighted cost approximates it. No direction errors and inside every
+    limit; ignores weights.
 
     Attributes:
         rank_tolerance: singular values up to this count as zero (absolute, units of J).
@@ -63,16 +63,8 @@ class AlphaTwoStage(Parameters):
         k = N.shape[1]
         if not k:
             return first
-        wanted = posture_velocity(problem)
+        posture, _ = posture_of(problem)
         G, h = limits_about(first, N, box, problem)
-        z = solve(QuadraticProgram(np.eye(k), N.T @ (first - wanted), G, h))
+        z = solve(QuadraticProgram(np.eye(k), N.T @ (first - posture), G, h))
         v: Array = first + N @ z
         return v
-
-
-def posture_velocity(problem: DikProblem) -> Array:
-    """The wanted velocity of the problem's first posture task, (nv,) [rad/s]; else zero."""
-    for task in problem.tasks:
-        if isinstance(task, LinearizedJointTask) and task.error.any():  # not one of damping
-            return task.V
-    return np.zeros(problem.robot.nv)

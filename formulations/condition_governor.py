@@ -1,4 +1,4 @@
-"""The pseudo-inverse, slowed down on the way into a singularity."""
+"""The pseudo-inverse, slowed down towards a singularity."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ class ConditionGovernor(Parameters):
 
     then `after`: nothing, or scaled down into the velocity limits. J (m, nv) and V (m,) are the
     primary task's, in the task frame; v in rad/s. kappa and its derivative along J^+ V are those of
-    the robot's task frame (body Jacobian, units m and rad), whatever the task. On course and
-    sheltered from singularities, in which it stops for good if the course leads through one;
-    leaving is not slowed down, so that it cannot lock. Weights play no part.
+    the robot's task frame (body Jacobian, units m and rad), whatever the task. No direction
+    errors; it stops for good before a singularity on its path. Leaving is not slowed down, so that
+    it cannot get stuck there. Ignores weights.
 
-    The source judges whether the motion approaches by a probing step along u_m; here
+    The source tests whether the motion approaches by a step along u_m; here
     dsigma_i/dt = u_i^T dJ/dt v_i is exact. Its later versions also slow leaving down, over twice
     the range, and stop above kappa_stop whatever the direction.
 
@@ -46,7 +46,7 @@ class ConditionGovernor(Parameters):
         stop: kappa_stop, where approaching ends.
         after: what to do with a velocity outside the limits; the source scales.
         rank_tolerance: singular values up to this count as zero (absolute, units of J); such a
-            frame is at its singularity and can only leave it.
+            frame is at its singularity and is not slowed down.
 
     Source: [MoveItServo], first version.
     """
@@ -75,11 +75,11 @@ class ConditionGovernor(Parameters):
         return v if self.after == "none" or limit is None else scaled(v, limit)
 
     def _scale(self, robot: Robot, q: Array, v: Array) -> float:
-        """The factor c for a velocity (nv,) at a configuration (nq,)."""
+        """Compute the factor c for a velocity (nv,) at a configuration (nq,)."""
         rows, data = list(robot.task_rows), robot.scratch
         pin.computeJointJacobiansTimeVariation(robot.model, data, q, v)
         local = (robot.model, data, robot.frame_id, pin.LOCAL)
-        # Of a single joint Pinocchio makes a vector.
+        # Pinocchio returns a vector for a single joint.
         J = pin.getFrameJacobian(*local).reshape(6, -1)[rows]
         U, sigma, Vt = thin_svd(J)
         largest, smallest = sigma[0], sigma[-1]

@@ -23,8 +23,7 @@ class DampedLeastSquares(Parameters):
         min ||J v - V||^2 + lambda^2 ||v||^2,   v = J^T (J J^T + lambda^2 I)^-1 V
 
     J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s. Bounded by
-    ||V|| / (2 lambda), never exact, and knows no limits;
-    weights play no part.
+    ||V|| / (2 lambda) and never exact. Ignores limits and weights.
 
     Attributes:
         damping: lambda, unsquared (units of J); 0.01-0.05 in the recent literature.

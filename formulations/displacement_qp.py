@@ -1,4 +1,4 @@
-"""The program that Pink and mink share, in velocities: what differs are gains and damping."""
+"""The program of Pink and mink in velocities, which differ in gains and damping."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from dikbench.problem import (
 
 @dataclass(frozen=True)
 class DisplacementQp(Parameters):
-    """The program of a law that is posed in displacements Delta q = v dt, divided by dt^2.
+    """A program that is posed in displacements Delta q = v dt, divided by dt^2.
 
         min_v  sum_i 1/2 ||Jl_i (J_i v - V_i)||^2_(W_i) + 1/2 (lambda^2 + mu_i) ||v||^2
         s.t.   max(gain (q_min - q)/dt, v_min) <= v <= min(gain (q_max - q)/dt, v_max)
 
     with Jl_i the derivative of the task's logarithm and mu_i = lm_damping dt^2 ||V_i||^2_(W_i): P
-    is theirs, q is theirs over dt, and so is h. With acceleration limits in force also
+    is theirs, q and h are theirs over dt. With acceleration limits in force also
     v_prev + a_min dt <= v <= v_prev + a_max dt and v <= sqrt(2 a d) at a distance d from a limit.
-    All tasks count with their weights, priorities do not.
+    All tasks have their weights; priorities are ignored.
 
     Attributes:
         damping: lambda, unsquared.
@@ -69,5 +69,5 @@ class DisplacementQp(Parameters):
 
 
 def _braking(distance: Array, deceleration: Array, dt: float) -> Array:
-    """sqrt(2 a d), (nv,) [rad/s]; no bound outside a limit, where the box asks for the way back."""
+    """Compute sqrt(2 a d), (nv,) [rad/s]; infinite outside, where the box leads back."""
     return np.where(distance < 0, np.inf, sqrt_brake(distance, deceleration, dt))

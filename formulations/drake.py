@@ -21,13 +21,13 @@ from dikbench.problem import (
 )
 from formulations.lu_kernel import lu_kernel
 
-REWARD = 100.0
-"""Of alpha, beside a squared null-space velocity."""
+ALPHA_REWARD = 100.0
+"""Weight of alpha relative to the squared null-space velocity."""
 
 
 @dataclass(frozen=True)
 class Drake(Parameters):
-    """Alpha scaling as Drake ships it: progress and joint centring weighed in one cost.
+    """Alpha scaling as in Drake: progress and joint centring in one weighted cost.
 
         min_(v, alpha)  -100 alpha + ||P (v - K e)||^2
         s.t.            J v = alpha V,   0 <= alpha <= 1,   lo <= v <= hi   (the velocity box)
@@ -35,10 +35,10 @@ class Drake(Parameters):
     J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s; e = q_nom - q the
     error of the problem's posture task, (nv,) (zero where there is none), K its own gain. The rows
     of P are the kernel of J that a full-pivoting LU gives (Eigen's `FullPivLU`, from a J with its
-    angular rows first): **not** orthonormal, and dependent on the axes of J. There is no such term
-    where rank J = nv: the program is then linear. Never off course and inside every limit; the
-    quadratic term pulls alpha below what the limits allow, the more the larger K. Weights play no
-    part.
+    angular rows first): **not** orthonormal, and dependent on the axes of J. Where rank J = nv
+    there is no such term and the program is linear. No direction errors and inside every limit; the
+    quadratic term reduces alpha below what the limits allow, the more the larger K. Ignores
+    weights.
 
     Attributes:
         centering: K [1/s]; 0, Drake's default, penalises every null-space velocity; its manual's
@@ -58,13 +58,13 @@ class Drake(Parameters):
         J, V = task.J, task.V
         m, n = J.shape
         P, q = np.zeros((n + 1, n + 1)), np.zeros(n + 1)
-        q[n] = -1.0  # the whole cost over REWARD: the same program, in a solver's own scale
+        q[n] = -1.0  # the cost over ALPHA_REWARD: the same program, better scaled
         kernel = lu_kernel(angular_first(J))
         if kernel.size:
-            penalty = 2 / REWARD * kernel @ kernel.T
+            penalty = 2 / ALPHA_REWARD * kernel @ kernel.T
             P[:n, :n] = penalty
             if self.centering:
-                q[:n] = -penalty @ (self.centering * posture_error(problem))
+                q[:n] = -penalty @ (self.centering * posture_of(problem)[1])
         A = np.empty((m, n + 1))
         A[:, :n], A[:, n] = J, -V
         box = problem.box("one-step")
@@ -74,14 +74,14 @@ class Drake(Parameters):
         return x[:n]
 
 
-def posture_error(problem: DikProblem) -> Array:
-    """q_nom - q of the problem's first posture task, (nv,) [rad]; zero where there is none."""
+def posture_of(problem: DikProblem) -> tuple[Array, Array]:
+    """Return V [rad/s] and error q_nom - q [rad] of the first posture task, (nv,), or zeros."""
     for task in problem.tasks:
         if isinstance(task, LinearizedJointTask) and task.error.any():  # not one of damping
-            return task.error
-    return np.zeros(problem.robot.nv)
+            return task.V, task.error
+    return np.zeros(problem.robot.nv), np.zeros(problem.robot.nv)
 
 
 def angular_first(J: Array) -> Array:
-    """The rows of a pose's Jacobian in Drake's order."""
+    """Put the rows of a pose's Jacobian (6, nv) in Drake's order (angular; linear)."""
     return np.roll(J, 3, axis=0) if len(J) == 6 else J

@@ -20,14 +20,14 @@ from dikbench.problem import (
     Range,
     Solve,
 )
-from formulations.drake import angular_first, posture_error
+from formulations.drake import angular_first, posture_of
 from formulations.lu_kernel import lu_kernel
 
-NEAR = 0.0025
-"""Distance [rad] to a limit from which on nothing moves towards it."""
+STOP_RAD = 0.0025
+"""Distance to a limit below which a joint does not move towards it."""
 
-INFLUENCE = 0.1
-"""Distance [rad] from which a limit slows a joint down."""
+INFLUENCE_RAD = 0.1
+"""Distance to a limit below which a joint is slowed down."""
 
 
 @dataclass(frozen=True)
@@ -39,11 +39,11 @@ class DrakeSystem(Parameters):
 
     J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s; e = q_nom - q is the
     error of the problem's posture task, (nv,) (zero where there is none); P the kernel of J by a
-    full-pivoting LU, as in `drake`, but of a J in the axes of the world, as the system has it (the
-    pivots and with them the length of P's rows depend on the axes); d the distance to the nearer
-    position limit [rad], whose side alone is scaled. Keeps the velocity limits and, by the scaling,
-    the position limits in motions of ordinary speed; outside a limit a joint may stay where it is.
-    Leaves the course where the bounds bind. Weights play no part.
+    full-pivoting LU, as in `drake`, but of a J in the axes of the world, as in the system (the
+    pivots and the length of P's rows depend on the axes); d the distance to the nearer position
+    limit [rad], on whose side alone the bound is scaled. Keeps the velocity limits and, at ordinary
+    speeds, the position limits; outside a limit a joint may stay there. Direction errors where
+    bounds are active. Ignores weights.
 
     Attributes:
         tracking_weight: G; Drake's own default is 1, its manual advises 100.
@@ -68,13 +68,13 @@ class DrakeSystem(Parameters):
         if kernel.size:
             centred = kernel @ kernel.T / self.tracking_weight
             P += centred
-            q -= centred @ (self.centering * posture_error(problem))
+            q -= centred @ (self.centering * posture_of(problem)[1])
         lower, upper = scaled_bounds(problem.limits)
         return solve(QuadraticProgram(P, q, lb=lower, ub=upper))
 
 
 def _in_world_axes(problem: DikProblem, J: Array) -> Array:
-    """The Jacobian of a pose (6, nv) in the axes of the world; any other task's as it is."""
+    """Turn a pose's Jacobian (6, nv) into the axes of the world; leave any other one."""
     if len(J) != 6:
         return J
     robot = problem.robot
@@ -84,7 +84,7 @@ def _in_world_axes(problem: DikProblem, J: Array) -> Array:
 
 
 def scaled_bounds(limits: Limits) -> tuple[Array, Array]:
-    """Velocity bounds (nv,) [rad/s], the one towards the nearer position limit scaled down."""
+    """Compute velocity bounds (nv,) [rad/s], the one towards the nearer limit scaled down."""
     velocity = limits.joint.velocity
     if velocity is None:
         n = limits.joint.nv
@@ -93,6 +93,6 @@ def scaled_bounds(limits: Limits) -> tuple[Array, Array]:
         return velocity.lower, velocity.upper
     nearer = limits.to_lower < limits.to_upper
     distance = np.minimum(limits.to_lower, limits.to_upper)
-    scale = np.clip((distance - NEAR) / (INFLUENCE - NEAR), 0.0, 1.0)
+    scale = np.clip((distance - STOP_RAD) / (INFLUENCE_RAD - STOP_RAD), 0.0, 1.0)
     lower = np.where(nearer, scale * velocity.lower, velocity.lower)
     return lower, np.where(nearer, velocity.upper, scale * velocity.upper)

@@ -1,4 +1,4 @@
-"""Lexicographic quadratic programs: each level moves in what the ones above leave free."""
+"""Lexicographic quadratic programs: each level moves in the null space of those above."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from dikbench.problem import (
 )
 from formulations.null_space_program import limits_about
 
-UNIQUE = 1e-5
-"""Damping of the levels above the last: makes their programs strictly convex, and a task gives way
-by (1e-5/sigma)^2 of its velocity along a direction with the singular value sigma."""
+UPPER_LEVEL_DAMPING = 1e-5
+"""Damping of the levels above the last, which makes their programs strictly convex; a task loses
+(1e-5/sigma)^2 of its velocity along a direction with the singular value sigma."""
 
-ATTEMPTS = 4
-"""Of a level below the first, each with ten times the damping of the one before: z = 0 is feasible,
-but active-set methods take bounds for contradictory that a hardly damped direction makes nearly
-parallel."""
+ATTEMPTS_PER_LOWER_LEVEL = 4
+"""Solves of a level below the first, each with ten times the previous damping: z = 0 is feasible,
+but active-set methods find bounds contradictory that are nearly parallel in a hardly damped
+direction."""
 
 
 @dataclass(frozen=True)
@@ -46,10 +46,9 @@ class HierarchicalQp(Parameters):
     multiplied by the square roots of their weights, poses in the task frame; v in rad/s; lo and hi
     the velocity box. The last level adds 1/2 lambda^2 ||v||^2, the others do with lambda = 1e-5;
     below the first, where the solver fails, ten times more is tried, up to a thousand times.
-    What the levels above have reached is kept by moving in the null space of their rows,
-    v = v_(k-1) + N z, so that no solver's tolerance lets it go. With one level it is `qp`, with no
-    bound active `nullspace`. Singular where a task is, but inside the limits; leaves the course
-    where a bound binds.
+    The results of the levels above are kept exactly by moving in the null space of their rows,
+    v = v_(k-1) + N z. With one level it is `qp`, without active bounds `nullspace`. Singular where
+    a task is, but inside the limits; direction errors where a bound is active.
 
     Attributes:
         damping: lambda, unsquared, of the last level.
@@ -78,16 +77,16 @@ class HierarchicalQp(Parameters):
             scale = np.sqrt(np.broadcast_to(level.weight, level.V.shape))
             A = scale[:, None] * level.J @ N
             last = number == len(levels) - 1
-            damping = self.damping if last else UNIQUE
+            damping = self.damping if last else UPPER_LEVEL_DAMPING
             r = scale * (level.V - level.J @ v)
-            for attempts_left in reversed(range(ATTEMPTS if number else 1)):
+            for attempts_left in reversed(range(ATTEMPTS_PER_LOWER_LEVEL if number else 1)):
                 try:
                     z = solve(_level(A, r, v, N, box, damping, problem))
                     break
                 except SolverFailed:
                     if not attempts_left:
                         raise
-                    damping = max(10 * damping, UNIQUE)
+                    damping = max(10 * damping, UPPER_LEVEL_DAMPING)
             v = v + N @ z
             if not last:
                 free = null_space(A, self.rank_tolerance)
@@ -99,11 +98,14 @@ class HierarchicalQp(Parameters):
 def _level(
     A: Array, r: Array, v: Array, N: Array, box: Box, damping: float, problem: DikProblem
 ) -> QuadraticProgram:
-    """Min 1/2 ||A z - r||^2 + 1/2 damping^2 ||v + N z||^2 s.t. the limits on v + N z, in z."""
+    """Pose the program of one level in z.
+
+    min 1/2 ||A z - r||^2 + 1/2 damping^2 ||v + N z||^2   s.t.   the limits on v + N z
+    """
     k = N.shape[1]
     P = A.T @ A + damping**2 * np.eye(k)  # N is orthonormal
     q = -A.T @ r + damping**2 * (N.T @ v)
-    if k == len(v):  # nothing above has taken anything: N = I
+    if k == len(v):  # no level above has used a direction: N = I
         h = None if problem.G is None or problem.h is None else problem.h - problem.G @ v
         return QuadraticProgram(P, q, problem.G, h, lb=box.lower - v, ub=box.upper - v)
     return QuadraticProgram(P, q, *limits_about(v, N, box, problem))

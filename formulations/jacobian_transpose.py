@@ -17,9 +17,9 @@ class JacobianTranspose(Parameters):
         v = a J^T V,   a = <V, J J^T V> / ||J J^T V||^2
 
     J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s. a minimises
-    ||a J J^T V - V||. Needs no inverse and nothing blows up at a singularity, but it is off course
-    wherever J J^T V is not along V: the directions that the arm does badly are hardly done at all.
-    Knows no limits; weights play no part.
+    ||a J J^T V - V||. Needs no inverse and is bounded at a singularity, but has direction errors
+    wherever J J^T V is not along V: directions with small singular values hardly move. Ignores
+    limits and weights.
 
     Attributes:
         rank_tolerance: V is taken as lost, and v = 0, where ||J^T V|| is up to this share of ||V||

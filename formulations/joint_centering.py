@@ -22,21 +22,21 @@ from dikbench.problem import (
 
 @dataclass(frozen=True)
 class JointCentering(Parameters):
-    """Joint centring: do the task, and draw the joints to the middle of their range meanwhile.
+    """Joint centring: do the task, and move the joints towards the middle of their range.
 
         v = J^# V + (I - J^+ J) v_2   (exact)   or   J^# V + (I - J^# J) v_2   (damped)
         v_2 = -k (q - q_mid),  q_mid = (q_min + q_max) / 2
 
-    joint by joint, 0 for a joint that has not both limits; J (m, nv) and V (m,) are the primary
+    joint by joint, 0 for a joint without both limits; J (m, nv) and V (m,) are the primary
     task's, in the task frame; J^# = J^T (J J^T + lambda^2 I)^-1; v in rad/s. Stays away from the
-    joints' limits as far as the null space allows, and keeps none. Other tasks and weights play no
-    part: for a posture of one's own choice take `nullspace` and a posture task.
+    joint limits as far as the null space allows, but does not keep them. Ignores other tasks and
+    weights: for another posture use `nullspace` with a posture task.
 
     Attributes:
         gain: k [1/s].
         damping: lambda, unsquared (units of J); 0 by default: the task exactly.
-        projector: whether what the task leaves free is computed without damping or with it; with
-            it centring leaks into the task.
+        projector: whether the null-space projector is exact or damped; damped, centring disturbs
+            the task.
         rank_tolerance: singular values of J up to this count as zero (absolute, units of J).
 
     Source: [Liegeois1977].
@@ -61,7 +61,7 @@ class JointCentering(Parameters):
 
 
 def distance_to_middle(limits: Limits) -> Array | None:
-    """q_mid - q [rad or m], (nv,), 0 where a joint has not both limits; None: none in force."""
+    """Compute q_mid - q, (nv,) [rad or m]; 0 without both limits, None if none is in force."""
     if limits.joint.middle is None or limits.coordinates is None:
         return None
     distance: Array = limits.joint.middle - limits.coordinates

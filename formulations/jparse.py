@@ -1,4 +1,4 @@
-"""J-PARSE: the wanted motion projected on what the arm can do."""
+"""J-PARSE: the desired motion projected on the directions of the arm."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dikbench.problem import Array, DikProblem, Drawn, Parameters, Range, Solve,
 
 @dataclass(frozen=True)
 class JParse(Parameters):
-    """J-PARSE: a safe inverse of the motion, its nearly lost directions scaled down.
+    """J-PARSE: the pseudo-inverse with its nearly lost directions scaled down.
 
         v = sum_i g_i v_i (u_i . V),   g_i = 1/sigma_i                  if sigma_i > gamma sigma_1
                                              sigma_i/(gamma sigma_1)^2  else
@@ -20,12 +20,12 @@ class JParse(Parameters):
     J = sum_i sigma_i u_i v_i^T (m, nv) and V (m,) are the primary task's, in the task frame; v in
     rad/s. Continuous, bounded by ||V|| / (gamma sigma_1) and the pseudo-inverse away from
     singularities; into a singularity it slows down, and out of one it starts slowly. gamma sigma_1
-    may be large: the arms here count as nearly singular at many an ordinary posture. Knows no
-    limits; weights play no part.
+    may be large: many ordinary postures of the arms here count as nearly singular. Ignores limits
+    and weights.
 
     Attributes:
         threshold: gamma, the share of the largest singular value up to which a direction counts as
-            nearly lost (the source lets those have gains of their own, here 1).
+            nearly lost (the source gives those gains of their own, here 1).
 
     Source: [Guptasarma2025].
     """

@@ -27,13 +27,13 @@ class LevenbergMarquardt(Parameters):
     J (m, nv), V (m,), the error e (m,) and the weights W are the primary task's, in the task
     frame; v in rad/s. Three rules in two numbers: Chan & Lawrence k > 0, damping 0; Sugihara k = 1,
     damping > 0 (his bias is damping^2, the same for all joints); Wampler's fixed damping k = 0,
-    with W = I the law `dls`. Careful far from a target out of reach, exact at the target; on course
-    E is small, and only the fixed share protects at a singularity. The sources take displacements,
-    with V = e. Knows no limits.
+    with W = I the formulation `dls`. Strongly damped far from a target, exact at the target; while
+    E is small only the fixed part damps at a singularity. The sources use displacements, V = e.
+    Ignores limits.
 
     Attributes:
         error_factor: k; 0.1-1 in the literature.
-        damping: the fixed share, unsquared; a bias of 1e-4 to 1e-3 in the literature.
+        damping: the fixed part, unsquared; a bias of 1e-4 to 1e-3 in the literature.
 
     Source: [ChanLawrence1988], [Sugihara2011]; [Wampler1986] for the fixed damping.
     """

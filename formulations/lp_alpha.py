@@ -1,4 +1,4 @@
-"""Scale the wanted motion down until it is feasible, as a linear program."""
+"""Scale the desired motion down until it is feasible, as a linear program."""
 
 from __future__ import annotations
 
@@ -25,17 +25,18 @@ from dikbench.problem import (
 
 @dataclass(frozen=True)
 class LpAlpha(Parameters):
-    """Alpha scaling: go in the wanted direction, as fast as the limits allow.
+    """Alpha scaling: move in the desired direction, as fast as the limits allow.
 
         max_(v, alpha)  alpha - 1/2 rho ||v||^2
         s.t.            J v = alpha V,   0 <= alpha <= 1,   lo <= v <= hi   (the velocity box),
                         G v <= h   (torques and distances, where the scenario bounds them)
 
     J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s. A linear program
-    where rho = 0; its vertices are not unique where the arm has a null space and v then chatters,
-    which a small rho cures, for at most rho/2 ||v||^2 of alpha. Never off course and inside every
-    limit; slows down, and where the wanted direction is lost the frame stops (with rho = 0 the
-    joints need not: alpha = 0 leaves the null space of a singular J free). Weights play no part.
+    where rho = 0; its vertices are not unique where the arm has a null space, and v then chatters.
+    A small rho avoids that at the cost of at most rho/2 ||v||^2 of alpha. No direction errors and
+    inside every limit; slows down, and where the desired direction is lost the frame stops (with
+    rho = 0 the joints need not: alpha = 0 leaves the null space of a singular J free). Ignores
+    weights.
 
     Attributes:
         regularization: rho; None: 1e-4 if the arm has more joints than the task has rows, else 0.
@@ -61,7 +62,7 @@ class LpAlpha(Parameters):
 
 
 def regularization_for(task: LinearizedTask, given: float | None) -> float:
-    """The weight rho: as given, else 1e-4 where the task leaves joints free and 0 elsewhere."""
+    """Return rho: as given, else 1e-4 where the task leaves joints free and 0 elsewhere."""
     if given is not None:
         return given
     m, n = task.J.shape
@@ -75,7 +76,7 @@ def alpha_program(
     G: Array | None = None,
     h: Array | None = None,
 ) -> QuadraticProgram:
-    """The program of `LpAlpha` in matrices, in x = (v, alpha), shape (nv + 1,)."""
+    """Pose the program of `LpAlpha` in matrices, in x = (v, alpha), shape (nv + 1,)."""
     m, n = task.J.shape
     P = np.zeros((n + 1, n + 1))
     P.flat[: n * (n + 2) : n + 2] = regularization

@@ -1,4 +1,4 @@
-"""Alpha scaling by components: x, y, z, roll, pitch and yaw are slowed down each by itself."""
+"""Alpha scaling by components: x, y, z, roll, pitch and yaw are slowed down separately."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from dikbench.problem import (
 )
 from formulations.lp_alpha import regularization_for
 
-UPRIGHT = 1e-3
+SMALLEST_COS_PITCH = 1e-3
 """|cos(pitch)| below which the rates of roll and yaw are not defined."""
 
 
@@ -38,9 +38,9 @@ class LpAlphaComponents(Parameters):
 
     J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s; alpha (m,). E (m, m)
     maps the rates of x, y, z, roll, pitch, yaw of the task frame in the world (R = Rz(yaw)
-    Ry(pitch) Rx(roll)) to its body twist, so that a teleoperator who pushes against a limit along
-    one axis keeps the others: off course on purpose, and dependent on the axes. lo and hi are the
-    velocity box. Weights play no part.
+    Ry(pitch) Rx(roll)) to its body twist, so that a teleoperator who meets a limit along one axis
+    keeps the others: direction errors are intended, and depend on the axes. lo and hi are the
+    velocity box. Ignores weights.
 
     Attributes:
         regularization: rho; None: 1e-4 if the arm has more joints than the task has rows, else 0.
@@ -79,7 +79,7 @@ class LpAlphaComponents(Parameters):
 
 
 def _rows(task: LinearizedTask, rows: tuple[int, ...]) -> list[int]:
-    """The rows of the twist that a task is about: a whole pose, a position or an orientation."""
+    """Return the twist's rows of a task: a whole pose, a position or an orientation."""
     turns = isinstance(task, LinearizedOrientation)
     part = [row for row in rows if (row >= 3) == turns]
     for kept in (list(rows), part):
@@ -89,7 +89,9 @@ def _rows(task: LinearizedTask, rows: tuple[int, ...]) -> list[int]:
 
 
 def twist_from_rates(rotation: Array) -> Array:
-    """E (6, 6): rates of x, y, z, roll, pitch, yaw in the world to a body twist (linear; angular).
+    """Compute E (6, 6): world rates of x, y, z, roll, pitch, yaw to a body twist.
+
+    The body twist is (linear; angular).
 
     Args:
         rotation: R = Rz(yaw) Ry(pitch) Rx(roll), (3, 3).
@@ -98,7 +100,7 @@ def twist_from_rates(rotation: Array) -> Array:
         Infeasible: where roll and yaw turn about the same axis.
     """
     pitch = np.arctan2(-rotation[2, 0], np.hypot(rotation[0, 0], rotation[1, 0]))
-    if abs(np.cos(pitch)) < UPRIGHT:
+    if abs(np.cos(pitch)) < SMALLEST_COS_PITCH:
         raise Infeasible("roll, pitch and yaw have no rates near cos(pitch) = 0")
     yaw = np.arctan2(rotation[1, 0], rotation[0, 0])
     c, s, cp, sp = np.cos(yaw), np.sin(yaw), np.cos(pitch), np.sin(pitch)

@@ -1,4 +1,4 @@
-"""Alpha scaling written in cvxpy's modelling words."""
+"""Alpha scaling written in cvxpy's modelling language."""
 
 from __future__ import annotations
 
@@ -25,13 +25,14 @@ from formulations.lp_alpha import alpha_program, regularization_for
 
 @dataclass(frozen=True)
 class LpAlphaCvxpy(Parameters):
-    """Alpha scaling as people write it in cvxpy: the program of `lp-alpha`, word for word.
+    """Alpha scaling as it is usually written in cvxpy: the program of `lp-alpha`.
 
         maximise   alpha - 1/2 rho ||v||^2
         subject to J v == alpha V,   0 <= alpha <= 1,   lo <= v,   v <= hi
 
     J, V, lo and hi are parameters (disciplined parametrised programming), so that the model is
-    compiled once per process and shape. Same alpha as `lp-alpha`, a hundred times its price.
+    compiled once per process and shape. It gives the alpha of `lp-alpha` in a hundred times its
+    time.
 
     Attributes:
         regularization: rho; None: 1e-4 if the arm has more joints than the task has rows, else 0.
@@ -69,11 +70,11 @@ class LpAlphaCvxpy(Parameters):
 def _compiled(
     m: int, below: tuple[bool, ...], above: tuple[bool, ...], rho: float
 ) -> tuple[Any, tuple[Any, Any], dict[str, Any]]:
-    """The model for a task of m rows, its unknowns and its parameters.
+    """Compile the model of a task of m rows; return it, its unknowns and its parameters.
 
     `below` and `above` say, joint by joint, which velocities are bounded at all.
     """
-    import cvxpy  # costs a second, and only this law needs it
+    import cvxpy  # takes a second, and only this formulation needs it
 
     n = len(below)
     v, alpha = cvxpy.Variable(n), cvxpy.Variable()

@@ -8,11 +8,11 @@ from dikbench.problem import Array
 
 
 def lu_kernel(A: Array) -> Array:
-    """A basis of the kernel of A (m, n), as columns (n, n - rank): what Eigen's FullPivLU returns.
+    """Compute the kernel of A (m, n), columns (n, n - rank), as Eigen's FullPivLU does.
 
-    Gaussian elimination with the largest remaining entry as pivot (the first one column by column
-    where several are equal) parts the columns into pivots and free ones; each basis vector has a
-    one at its own free column and zeros at the others. A pivot below the largest one times the
+    Gaussian elimination with the largest remaining entry as pivot (the first in column order among
+    equals) divides the columns into pivots and free ones; each basis vector has a one at its own
+    free column and zeros at the others. A pivot below the largest one times the
     machine's precision times min(m, n) counts as zero.
 
     Source: Golub & Van Loan (2013), Matrix Computations, section 3.4; Eigen 3.4.

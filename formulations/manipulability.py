@@ -8,13 +8,12 @@ from dikbench.problem import Array, thin_svd
 
 
 def manipulability_gradient(J: Array) -> Array:
-    """dw/dq of w = sqrt det(J J^T), (nv,), for a body Jacobian J (6, nv); zero where w is.
+    """Compute dw/dq of w = sqrt det(J J^T), (nv,), for a body Jacobian J (6, nv).
 
         dw/dq_k = w tr(J^+ dJ/dq_k),   dJ_j/dq_k = [J_j, J_k] for k > j, else 0
 
-    with [a, b] the Lie bracket of two body twists (linear; angular); columns in the order of the
-    chain, one joint each. For a planar arm, whose J has three rows (x, y; yaw), likewise in the
-    plane.
+    with [a, b] the Lie bracket of two body twists (linear; angular), columns in the order of the
+    chain, one joint each; zero where w is zero. For a planar arm, J has three rows (x, y; yaw).
 
     Source: Yoshikawa (1985), Manipulability of robotic mechanisms; Haviland & Corke (2023),
     Manipulator differential kinematics, part 2.
@@ -39,7 +38,7 @@ def manipulability_gradient(J: Array) -> Array:
 
 
 def _in_space(rows: Array, first: int) -> Array:
-    """Rows of a planar twist as the three of a spatial one."""
+    """Write the rows of a planar twist as the three of a spatial one."""
     spatial = np.zeros((3, rows.shape[1]))
     spatial[first : first + len(rows)] = rows
     return spatial

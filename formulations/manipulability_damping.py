@@ -25,15 +25,15 @@ class ManipulabilityDamping(Parameters):
         lambda^2 = lambda_0^2 (1 - w/w_0)^2  if w < w_0,  else 0
 
     J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s. Exact away from
-    singularities and continuous at w_0; but w is a product of all singular values in units of its
-    own, which says little about the smallest and has to be tuned to each arm (with more rows than
-    joints it is always 0). Knows no limits; weights play no part.
+    singularities and continuous at w_0; but w is the product of all singular values, which says
+    little about the smallest one and has to be tuned to each arm (with more rows than joints it is
+    always 0). Ignores limits and weights.
 
     Attributes:
         damping: lambda_0, unsquared (units of J), at the singularity itself.
-        threshold: w_0, the manipulability below which there is damping (units of det J); the source
-            leaves it to the arm: at their safe starts the arms here have 0.02 (the UR3, which is
-            thus hardly ever undamped) to 0.3.
+        threshold: w_0, the manipulability below which there is damping (units of det J); it
+            depends on the arm: at their safe starts the arms here have 0.02 (the UR3, which is thus
+            nearly always damped) to 0.3.
 
     Source: [NakamuraHanafusa1986].
     """

@@ -23,15 +23,15 @@ from dikbench.problem import (
 from formulations.manipulability import manipulability_gradient
 
 LARGEST_SLACK = 10.0
-"""Of each row of the task [m/s; rad/s]."""
+"""Largest slack of each row of the task [m/s; rad/s]."""
 
 SMALLEST_ERROR = 1e-6
-"""Below this ||e||_1 (m, rad) the price of the slack does not rise any more."""
+"""Value of ||e||_1 (m, rad) below which the price of the slack does not rise."""
 
 
 @dataclass(frozen=True)
 class Neo(Parameters):
-    """NEO's program without obstacles: a task that may give way for a better posture.
+    """NEO's program without obstacles: the task has a slack in favour of a better posture.
 
         min_(v, delta)  1/2 lambda_v ||v||^2 + 1/2 ||delta||^2 / ||e||_1 - k_m J_m^T v
         s.t.            J v + delta = V,   |delta_i| <= 10,   v_min <= v <= v_max,
@@ -39,10 +39,10 @@ class Neo(Parameters):
 
     J (m, nv), V (m,) and e (m,) are the primary task's (m/s, rad/s; m, rad), in the task frame; v
     in rad/s; J_m the gradient of the manipulability sqrt det(J J^T), (nv,); rho_i the distance to
-    the position limit ahead [rad], and likewise below. The slack grows dear as the error falls, so
-    that the arm first seeks a better posture and then the target. Leaves the course to do so. On
-    arms of joints with one degree of freedom each; the reward is left out where the task is not a
-    whole pose. Weights play no part.
+    the position limit ahead [rad], and likewise below. The price of the slack rises as the error
+    falls: the arm first improves its posture and then moves to the target, with direction errors.
+    For arms of joints with one degree of freedom each; without the reward where the task is not a
+    whole pose. Ignores weights.
 
     Attributes:
         velocity_weight: lambda_v.
@@ -74,7 +74,7 @@ class Neo(Parameters):
         task = problem.primary
         m, n = task.J.shape
         price = 1 / max(float(np.abs(task.error).sum()), SMALLEST_ERROR)
-        # Divided by the price: the same program, with numbers that solvers like near the target.
+        # Divided by the price: the same program, better scaled near the target.
         scale = min(1.0, 1 / price)
         P = np.diag(scale * np.concatenate([np.full(n, self.velocity_weight), np.full(m, price)]))
         q = np.zeros(n + m)
@@ -96,7 +96,7 @@ class Neo(Parameters):
         return x[:n]
 
     def _bounds(self, limits: Limits) -> tuple[Array, Array]:
-        """Velocity limits and dampers, (nv,) [rad/s]; never beyond a standstill from outside."""
+        """Compute velocity limits with dampers, (nv,) [rad/s]; at least rest from outside."""
         n, velocity = limits.joint.nv, limits.joint.velocity
         lower = np.full(n, -np.inf) if velocity is None else velocity.lower
         upper = np.full(n, np.inf) if velocity is None else velocity.upper
@@ -106,7 +106,7 @@ class Neo(Parameters):
         return lower, upper
 
     def _damper(self, distance: Array, free: Array) -> Array:
-        """The speed allowed towards a limit at a distance, (nv,) [rad/s]."""
+        """Compute the speed allowed towards a limit at a distance, (nv,) [rad/s]."""
         share = (distance - self.stop_distance) / (self.influence_distance - self.stop_distance)
         slowed = self.damper_gain * np.maximum(share, 0.0)
         return np.where(distance < self.influence_distance, slowed, free)

@@ -8,13 +8,13 @@ from dikbench.problem import Array, Box, DikProblem
 
 
 def limits_about(v: Array, N: Array, box: Box, problem: DikProblem) -> tuple[Array, Array]:
-    """Rows (p, k) and bounds (p,) on z that keep v + N z where a law has to keep it.
+    """Compute rows (p, k) and bounds (p,) on z that keep v + N z inside the limits.
 
         lo <= v + N z <= hi,   G (v + N z) <= h
 
-    with the velocity box lo, hi and the rows G, h of the problem; bounds that are infinite are left
-    out. Where v is outside by the tolerance of the solver that found it, the bound is moved there:
-    z = 0 stays feasible.
+    with the velocity box lo, hi and the rows G, h of the problem, without infinite bounds. Where v
+    is outside, by the tolerance of the solver that found it, the bound is moved to v, so that z = 0
+    is feasible.
 
     Args:
         v: the velocity so far, (nv,) [rad/s].
@@ -22,10 +22,10 @@ def limits_about(v: Array, N: Array, box: Box, problem: DikProblem) -> tuple[Arr
         box: the velocity box.
         problem: the control step.
     """
-    rows, room = [N, -N], [box.upper - v, v - box.lower]
+    rows, slack = [N, -N], [box.upper - v, v - box.lower]
     if problem.G is not None and problem.h is not None:
         rows.append(problem.G @ N)
-        room.append(problem.h - problem.G @ v)
-    bounds = np.maximum(np.concatenate(room), 0.0)
+        slack.append(problem.h - problem.G @ v)
+    bounds = np.maximum(np.concatenate(slack), 0.0)
     bounded = np.isfinite(bounds)
     return np.vstack(rows)[bounded], bounds[bounded]

@@ -22,7 +22,7 @@ from dikbench.problem import (
 
 @dataclass(frozen=True)
 class Nullspace(Parameters):
-    """Strict task priority: each task moves only what the tasks above it leave free.
+    """Strict task priority: each task moves in the null space of the tasks above it.
 
         v_0 = 0,  N_0 = I,  A_k = J_k N_(k-1)
         v_k = v_(k-1) + A_k^# (V_k - J_k v_(k-1))
@@ -30,16 +30,16 @@ class Nullspace(Parameters):
 
     over the priority levels k = 1, 2, ...; J_k (m_k, nv) and V_k (m_k,) are level k's, poses in the
     task frame; A^# = A^T (A A^T + lambda^2 I)^-1; v in rad/s. Does every task as well as those
-    above it allow and, with the exact projector, never disturbs them; knows no limits; without
-    damping it is singular wherever a task is, or where two tasks become dependent. The damped
-    "projector" is a common mistake: it lets lower tasks into those above, and as A_k^# makes up for
-    what it holds back, a posture below the first task all but replaces it. Weights play no part.
+    above it allow and, with the exact projector, never disturbs them. Without damping it is
+    singular wherever a task is, or where two tasks become dependent. The damped "projector" is a
+    common mistake: lower tasks disturb those above, and since A_k^# compensates for the damping, a
+    posture below the first task nearly replaces it. Ignores limits and weights.
 
     Attributes:
         damping: lambda, unsquared (units of J); 0 by default: every task exactly.
-        projector: whether what a task leaves free is computed without damping or with it.
-        rank_tolerance: singular values of A_k up to this count as zero (absolute, units of J_k: a
-            relative one explodes where nothing is left free).
+        projector: whether the null-space projector is exact or damped.
+        rank_tolerance: singular values of A_k up to this count as zero (absolute, units of J_k;
+            a relative tolerance fails where the null space is empty).
 
     Source: [Nakamura1987] for two tasks, [SicilianoSlotine1991] for any number.
     """

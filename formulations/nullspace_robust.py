@@ -26,15 +26,14 @@ class NullspaceRobust(Parameters):
 
     over the priority levels k = 1, 2, ...; N_(k-1) projects into the null space of all levels above
     k, stacked (N_k as in `nullspace`, with its two projectors); J_k (m_k, nv) and V_k (m_k,) are
-    level k's, poses in the task frame; J^# = J^T (J J^T + lambda^2 I)^-1; v in rad/s. Stays
-    bounded where two tasks become dependent (`nullspace` does not), and pays with the lower
-    task, which it does exactly only where their row spaces are orthogonal; with the exact projector
-    the tasks above are never disturbed. A task's own singularities need damping; knows no limits;
-    weights play no part.
+    level k's, poses in the task frame; J^# = J^T (J J^T + lambda^2 I)^-1; v in rad/s. Bounded
+    where two tasks become dependent, unlike `nullspace`; in return the lower task is exact only
+    where their row spaces are orthogonal. With the exact projector the tasks above are never
+    disturbed. A task's own singularities need damping. Ignores limits and weights.
 
     Attributes:
         damping: lambda, unsquared (units of J); 0 by default.
-        projector: whether what a task leaves free is computed without damping or with it.
+        projector: whether the null-space projector is exact or damped.
         rank_tolerance: singular values up to this count as zero (absolute, units of J_k).
 
     Source: [Chiaverini1997]; more than two levels with the projector of all levels above:
@@ -55,6 +54,6 @@ class NullspaceRobust(Parameters):
             N = N - inverse.taken(self.projector)
             alone = DampedInverse(level.J, self.rank_tolerance, self.damping)
             v = v + N.dot(alone.times(level.V))
-            if number <= len(others):  # what this level takes is of use to those below it
+            if number <= len(others):  # the levels below need this projector
                 inverse = DampedInverse(level.J.dot(N), self.rank_tolerance, self.damping)
         return v

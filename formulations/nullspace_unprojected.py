@@ -1,4 +1,4 @@
-"""A correction towards the second task that forgets the first: not a priority."""
+"""A correction towards the second task without a projection: not a priority."""
 
 from __future__ import annotations
 
@@ -18,10 +18,9 @@ class NullspaceUnprojected(Parameters):
 
     over the priority levels k = 1, 2, ...; J_k (m_k, nv) and V_k (m_k,) are level k's, poses in the
     task frame; v in rad/s. Lecture notes give it for two levels as a form of null-space projection,
-    which it is only where the row spaces of the tasks are orthogonal: nothing keeps the correction
-    out of the tasks above. The lowest task is done exactly, and with a posture as the lowest task
-    the first is forgotten. It is here as the mistake that it is; knows no limits; weights play
-    no part.
+    which it is only where the row spaces of the tasks are orthogonal; otherwise the correction
+    disturbs the tasks above. The lowest task is done exactly, so that a posture as the lowest task
+    replaces the first one. It is included as a common mistake; ignores limits and weights.
 
     Attributes:
         rank_tolerance: singular values of J_k up to this count as zero (absolute, units of J_k).

@@ -28,8 +28,8 @@ class PseudoInverse(Parameters):
                             scale: s v with the largest s <= 1 inside the velocity limits
 
     J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s. Exact where the task
-    is feasible, unbounded near a singularity; clipping leaves the course, scaling slows down.
-    Weights play no part.
+    is feasible, unbounded near a singularity; clipping causes direction errors, scaling slows
+    down. Ignores weights.
 
     Attributes:
         after: what to do with a velocity outside the limits.
@@ -57,5 +57,5 @@ class PseudoInverse(Parameters):
 
 
 def scaled(v: Array, limit: Interval) -> Array:
-    """The longest s v, s <= 1, inside the limits, (nv,)."""
+    """Scale v (nv,) by the largest s <= 1 that keeps it inside the limits."""
     return v / max(1.0, float(limit.usage(v).max()))

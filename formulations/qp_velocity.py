@@ -1,4 +1,4 @@
-"""The lecture's first quadratic program: velocity bounds only."""
+"""A quadratic program with velocity bounds only, as lectures introduce it."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class QpVelocity(Parameters):
 
         min_v  1/2 ||J v - V||^2 + 1/2 lambda^2 ||v||^2   s.t.   v_min <= v <= v_max
 
-    J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s. Leaves the course
-    where a bound binds, and runs into position limits. Weights and other tasks play no part.
+    J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s. Direction errors
+    where a bound is active; passes position limits. Ignores weights and other tasks.
 
     Attributes:
         damping: lambda, unsquared; not zero by default, else the minimiser is not unique on a

@@ -1,4 +1,4 @@
-"""Saturation in the null space, one task at a time: the loop that `sns` and `sns-optimal` share."""
+"""Saturation in the null space, level by level: the part that `sns` and `sns-optimal` share."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from dikbench.problem import (
     solve_positive_definite,
 )
 
-FREEDOM = 1e-6
-"""Square of the smallest share of a joint's velocity that must be free for it to be saturated:
-rounding grows by the inverse of the square, and what is above must stay below 1e-9."""
+SMALLEST_SQUARED_FREEDOM = 1e-6
+"""Square of the smallest free share of a joint's velocity with which it is saturated: rounding
+grows by its inverse, and must stay below 1e-9 in the levels above."""
 
-ROUNDING = 1e-10
-"""A multiplier [rad/s] whose sign is not to be trusted."""
+MULTIPLIER_ROUNDING_RAD_S = 1e-10
+"""Magnitude of a multiplier below which its sign is not reliable."""
 
-NEGLIGIBLE = 1e-100
-"""A speed [rad/s] that is none: quotients by it stay finite."""
+NEGLIGIBLE_SPEED_RAD_S = 1e-100
+"""A smaller speed counts as zero, so that quotients by it are finite."""
 
 
 class _Held(NamedTuple):
-    """The motion that saturated joints leave.
+    """The motion that is left with some joints saturated.
 
     Attributes:
-        base: the least motion from the start that has them at their bounds, (nv,).
-        free: projector onto the motions that move none of them, (nv, nv).
+        base: the least motion from the start with these joints at their bounds, (nv,).
+        free: projector onto the motions that move none of these joints, (nv, nv).
         effect: change of `base` per unit of each bound, (nv, number of saturated joints).
     """
 
@@ -44,13 +44,13 @@ class _Held(NamedTuple):
 def saturated_levels(
     problem: DikProblem, box: Box, rank_tolerance: float, *, optimal: bool
 ) -> Array:
-    """Every priority level in turn, each in the null space of those above, inside the box.
+    """Do every priority level in the null space of those above, inside the box.
 
     Where the box excludes rest, as under acceleration limits in motion, the least velocity may have
-    so many joints outside it that no saturation helps: then the least change of velocity.
+    too many joints outside the box; then the least change of velocity is tried.
 
     Raises:
-        Infeasible: if no scale of the first task was found for which the box holds.
+        Infeasible: if no scale of the first task was found that fits the box.
     """
     v, N = np.zeros(problem.robot.nv), np.eye(problem.robot.nv)
     levels = problem.levels
@@ -72,11 +72,11 @@ def saturated_levels(
 def _saturated(
     level: LinearizedTask, start: Array, N: Array, box: Box, tolerance: float, *, optimal: bool
 ) -> Array | None:
-    """The velocity of one level from `start` in the range of the projector N; None: none found."""
+    """Find the velocity of one level from `start` in the range of the projector N, or None."""
     bounds: dict[int, float] = {}  # of the saturated joints
     rank = None
     best, best_scale = None, -1.0
-    for _ in range(2 * len(start) + 1):  # freeing joints may go round in circles
+    for _ in range(2 * len(start) + 1):  # freeing joints may cycle
         held = _hold(bounds, start, N)
         if held is None:
             break
@@ -90,7 +90,7 @@ def _saturated(
         if scale > best_scale:
             best, best_scale = _inside(b + scale * a, box), scale
         if optimal and scale >= 0:
-            moved = b + scale * a - start  # by this level, which makes it as small as it can
+            moved = b + scale * a - start  # by this level
             wrong = _wrong_side(moved, held.effect, inverse @ level.J, box, bounds)
             for joint in wrong:
                 del bounds[joint]
@@ -98,7 +98,7 @@ def _saturated(
                 continue
         if critical is None:
             return _inside(a + b, box)
-        if held.free[critical, critical] <= FREEDOM:
+        if held.free[critical, critical] <= SMALLEST_SQUARED_FREEDOM:
             break
         outwards = a[critical] + b[critical] > box.upper[critical]
         bounds[critical] = float((box.upper if outwards else box.lower)[critical])
@@ -106,13 +106,13 @@ def _saturated(
 
 
 def _inside(v: Array, box: Box) -> Array:
-    """The velocity without what sticks out of the box, which is rounding; faster than `np.clip`."""
+    """Clip rounding errors to the box (nv,); faster than `np.clip`."""
     held: Array = np.minimum(np.maximum(v, box.lower), box.upper)
     return held
 
 
 def _hold(bounds: dict[int, float], start: Array, N: Array) -> _Held | None:
-    """Saturate joints, by least motion in the range of N; None where that leaves no way to."""
+    """Hold joints at their bounds by least motion in the range of N; None if impossible."""
     if not bounds:
         return _Held(start, N, np.empty((len(start), 0)))
     joints = list(bounds)
@@ -126,10 +126,10 @@ def _hold(bounds: dict[int, float], start: Array, N: Array) -> _Held | None:
 
 
 def _scale(a: Array, b: Array, box: Box, bounds: dict[int, float]) -> tuple[float, int | None]:
-    """The largest scale s <= 1 with a s + b in the box, and the joint to saturate next.
+    """Compute the largest scale s <= 1 with a s + b in the box, and the joint to hold next.
 
-    The scale is -1 where there is none that is not negative. The joint is, among those that are
-    outside at s = 1, the one that allows the least; None where none is.
+    The scale is -1 where no scale s >= 0 fits. The joint is, among those outside at s = 1, the one
+    with the smallest scale; None where none is outside.
     """
     v = a + b
     outside = (v < box.lower) | (v > box.upper)
@@ -137,7 +137,7 @@ def _scale(a: Array, b: Array, box: Box, bounds: dict[int, float]) -> tuple[floa
     outside[saturated] = False
     if not outside.any():
         return 1.0, None
-    moves = np.abs(a) > NEGLIGIBLE
+    moves = np.abs(a) > NEGLIGIBLE_SPEED_RAD_S
     inside = (box.lower <= b) & (b <= box.upper)
     low, high = np.where(inside, -np.inf, np.inf), np.where(inside, np.inf, -np.inf)
     np.divide(np.where(a > 0, box.lower, box.upper) - b, a, out=low, where=moves)
@@ -151,14 +151,14 @@ def _scale(a: Array, b: Array, box: Box, bounds: dict[int, float]) -> tuple[floa
 def _wrong_side(
     v: Array, effect: Array, done: Array, box: Box, bounds: dict[int, float]
 ) -> list[int]:
-    """The saturated joints whose coming off the bound would make the motion smaller.
+    """List the held joints whose coming off the bound would make the motion smaller.
 
-    The multipliers of the bounds in min 1/2 ||v||^2: the derivative of ||v||^2/2 by each bound.
+    The multiplier of a bound in min 1/2 ||v||^2 is the derivative of ||v||^2/2 by the bound.
     """
     slope = (effect - done @ effect).T @ v
     return [
         joint
         for joint, rate in zip(bounds, slope, strict=True)
-        if (bounds[joint] < box.upper[joint] and rate < -ROUNDING)
-        or (bounds[joint] > box.lower[joint] and rate > ROUNDING)
+        if (bounds[joint] < box.upper[joint] and rate < -MULTIPLIER_ROUNDING_RAD_S)
+        or (bounds[joint] > box.lower[joint] and rate > MULTIPLIER_ROUNDING_RAD_S)
     ]

@@ -10,8 +10,8 @@ import numpy as np
 
 from dikbench.problem import Array, DikProblem, Drawn, Parameters, Range, Solve, rank, thin_svd
 
-NO_RESPONSE: Final = 1e-10
-"""Singular values up to this are skipped, as in the authors' code."""
+LARGEST_SKIPPED_SINGULAR_VALUE: Final = 1e-10
+"""Directions with singular values up to this are skipped, as in the authors' code."""
 
 
 @dataclass(frozen=True)
@@ -27,15 +27,15 @@ class SelectiveDamping(Parameters):
                v = s gamma_max/(gamma_max + max|s|)
 
     J = sum_i sigma_i u_i v_i^T (m, nv) and V (m,) are the primary task's, in the task frame; v in
-    rad/s. x^(k) is the share of the k-th end effector, here of the k-th task of first priority
-    (the source's have three rows each, and a pose counts as one). No joint is faster than
-    gamma_max and a nearly lost direction is hardly moved, unless its joints have no other use,
-    without any damping elsewhere; the soft one is off course everywhere, and jumps to half where
-    the sum reaches gamma_max. Knows no limits; weights play no part.
+    rad/s. x^(k) is the part of the k-th end effector, here of the k-th task of first priority (in
+    the source each has three rows; here a pose is one). No joint is faster than gamma_max; a nearly
+    lost direction moves slowly, unless its joints have no other use, and other directions are not
+    damped. The soft variant has direction errors everywhere, and jumps to half the velocity where
+    the sum reaches gamma_max. Ignores limits and weights.
 
     Attributes:
-        max_rate: gamma_max [rad/s]. The source limits displacements, to pi/4 in an iteration; as
-            a rate the default is about a joint's speed limit.
+        max_rate: gamma_max [rad/s]. The source limits displacements to pi/4 per iteration; the
+            default is about a joint's speed limit.
         clamp: hard, as in the paper, or soft, as in the authors' published code.
 
     Source: [BussKim2005].
@@ -48,7 +48,7 @@ class SelectiveDamping(Parameters):
         """See `Formulation`."""
         task = problem.primary
         U, sigma, Vt = thin_svd(task.J)
-        k = rank(sigma, NO_RESPONSE)
+        k = rank(sigma, LARGEST_SKIPPED_SINGULAR_VALUE)
         U, sigma, Vt = U[:, :k], sigma[:k], Vt[:k]
         priority = problem.tasks[0].priority
         rows = accumulate(len(other.V) for other in problem.tasks if other.priority == priority)
@@ -68,6 +68,6 @@ class SelectiveDamping(Parameters):
 
 
 def _lengths(columns: Array, starts: list[int]) -> Array:
-    """Of each column (m, n) the sum of the norms of its blocks, (n,), that start at these rows."""
+    """Sum the norms of each column's blocks, which start at these rows, (m, n) -> (n,)."""
     lengths: Array = np.sqrt(np.add.reduceat(columns**2, starts)).sum(axis=0)
     return lengths

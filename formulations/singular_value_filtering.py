@@ -11,20 +11,19 @@ from dikbench.problem import Array, DikProblem, Drawn, Parameters, Range, Solve,
 
 @dataclass(frozen=True)
 class SingularValueFiltering(Parameters):
-    """Singular value filtering: invert singular values that never get below a smallest one.
+    """Singular value filtering: invert singular values that are raised to a smallest value.
 
         v = sum_i v_i (u_i . V) / h(sigma_i)
         h(s) = (s^3 + nu s^2 + 2 s + 2 s_0) / (s^2 + nu s + 2) = s + 2 s_0 / (s^2 + nu s + 2)
 
     J = sum_i sigma_i u_i v_i^T (m, nv) and V (m,) are the primary task's, in the task frame; v in
     rad/s. h(0) = s_0 and h rises, hence ||v|| <= ||V|| / s_0, also where rank is lost. Smooth and
-    nearly exact away from singularities; at one it does not slow down: the lost direction is asked
-    for at 1/s_0, in a joint direction v_m that is then chance. Knows no limits; weights play no
-    part.
+    nearly exact away from singularities. At a singularity it does not slow down: the lost direction
+    has the gain 1/s_0, in a joint direction v_m that is then arbitrary. Ignores limits and weights.
 
     Attributes:
-        smallest: s_0, the value that a lost singular value is taken for (units of J); 0.005-0.01.
-        shape: nu, how soon h follows s; between s_0 and 2/s_0, where h rises.
+        smallest: s_0, the value that replaces a lost singular value (units of J); 0.005-0.01.
+        shape: nu, which determines how closely h follows s; between s_0 and 2/s_0, where h rises.
 
     Source: [ColomeTorras2015].
     """

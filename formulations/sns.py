@@ -11,7 +11,7 @@ from formulations.saturation import saturated_levels
 
 @dataclass(frozen=True)
 class SaturationInNullSpace(Parameters):
-    """Saturation in the null space: hold joints at their bounds, let the others make up for it.
+    """Saturation in the null space: hold joints at their bounds, let the others compensate.
 
         v = v_N + (J W)^+ (s V - J v_N),   lo <= v <= hi   (the velocity box),   0 <= s <= 1
 
@@ -23,12 +23,12 @@ class SaturationInNullSpace(Parameters):
     were held are free to come off their bounds. A level for which no s fits is left out.
 
     J (m, nv) and V (m,) are each level's, poses in the task frame; v in rad/s. Strict priority
-    with bounds active or not; never off course and inside every limit; stops short of the largest
-    s in some states (one in twenty on a Panda asked for too much). At a singularity it does what
-    the pseudo-inverse does. Where the box excludes rest (outside a limit, or in motion under
-    acceleration limits) this may find no s for the first task: then it starts again with
-    v_N = v_prev, so that the least change of the velocity is what joints are held of. `Infeasible`
-    where that finds none either. Weights play no part.
+    with and without active bounds; no direction error and inside every limit; s is below the
+    largest possible one in some states (one in twenty of a Panda asked for too much). At a
+    singularity it behaves as the pseudo-inverse does. Where the box excludes rest (outside a limit,
+    or in motion under acceleration limits) this may find no s for the first task: then it starts
+    again with v_N = v_prev, and joints are held of the least change of velocity. `Infeasible` where
+    that finds none either. Ignores weights.
 
     Attributes:
         braking: how the box approaches a position limit (see `dikbench.problem.velocity_box`).

@@ -11,10 +11,10 @@ from formulations.saturation import saturated_levels
 
 @dataclass(frozen=True)
 class OptimalSaturationInNullSpace(Parameters):
-    """Optimal saturation in the null space: `sns` that lets go of joints held in vain.
+    """Optimal saturation in the null space: `sns` that releases joints held without need.
 
-    As `sns`, but whenever a scale s fits, the joints that are held at a bound although the motion
-    would be smaller without are let go, by the sign of their multiplier in
+    As `sns`, but whenever a scale s fits, the joints held at a bound without which the motion
+    would be smaller are released, by the sign of their multiplier in
 
         min_v 1/2 ||v||^2   s.t.   J v = s V,   lo <= v <= hi,
         mu = T^T v,   T_j = dv/d(bound_j),   mu_j <= 0 at hi,   mu_j >= 0 at lo
@@ -24,7 +24,7 @@ class OptimalSaturationInNullSpace(Parameters):
     not of s: where the task has to be scaled it comes nearer to the largest s than `sns` in some
     states and less near in others. J (m, nv) and V (m,) are each priority level's, poses in the
     task frame; v in rad/s. Strict priority, bounds active or not; `Infeasible` where no s fits.
-    Weights play no part.
+    Ignores weights.
 
     Attributes:
         braking: how the box approaches a position limit (see `dikbench.problem.velocity_box`).

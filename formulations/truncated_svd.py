@@ -1,4 +1,4 @@
-"""The pseudo-inverse without the directions that the arm does badly."""
+"""The pseudo-inverse without the nearly lost directions."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ class TruncatedSvd(Parameters):
 
     J = sum_i sigma_i u_i v_i^T (m, nv) and V (m,) are the primary task's, in the task frame; v in
     rad/s. Bounded by ||V|| / (c sigma_1) and the pseudo-inverse where nothing is given up; jumps,
-    and chatters in closed loop, where a singular value crosses the threshold. Knows no limits;
-    weights play no part.
+    and chatters in closed loop, where a singular value crosses the threshold. Ignores limits
+    and weights.
 
     Attributes:
-        relative_tolerance: c, the share of the largest singular value up to which one is dropped;
-            0.01 in the source's published code.
+        relative_tolerance: c, the share of the largest singular value up to which a direction is
+            dropped; 0.01 in the source's published code.
 
     Source: [Buss2004].
     """

@@ -12,7 +12,7 @@ from dikbench.problem import Array, DikProblem, Drawn, Parameters, Range, Solve,
 
 @dataclass(frozen=True)
 class VariableDamping(Parameters):
-    """Variable damping: damp near a singularity only, and only the direction that is lost there.
+    """Variable damping: damp the lost direction only, and only near a singularity.
 
         numerical:  v = J^T (J J^T + beta^2 I + lambda^2 u_m u_m^T)^-1 V
         isotropic:  v = J^T (J J^T + beta^2 I + lambda^2 I)^-1 V
@@ -20,8 +20,8 @@ class VariableDamping(Parameters):
 
     with sigma_m the smallest singular value of J and u_m its left singular vector. J (m, nv) and
     V (m,) are the primary task's, in the task frame; v in rad/s. Exact away from singularities
-    and, with numerical filtering, in the directions that stay; where two directions are lost at
-    once only beta damps the second. Knows no limits; weights play no part.
+    and, with numerical filtering, in the directions that remain; where two directions are lost at
+    once only beta damps the second. Ignores limits and weights.
 
     Attributes:
         damping: lambda_max, unsquared (units of J); 0.02-0.1 in the literature.

@@ -1,4 +1,4 @@
-"""The weighted least-norm solution, which spares joints on their way to a limit."""
+"""The weighted least-norm solution, which slows joints that approach a limit."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from dikbench.problem import Array, DampedInverse, DikProblem, Drawn, Parameters
 
 @dataclass(frozen=True)
 class WeightedLeastNorm(Parameters):
-    """Weighted least norm: let those joints do the task that are not on their way to a limit.
+    """Weighted least norm: prefer joints that do not approach a limit.
 
         min v^T W v  s.t.  J v = V,   v = W^-1 J^T (J W^-1 J^T + lambda^2 I)^-1 V,   W = diag(w)
         w_i = 1 + |dH/dq_i| if v_prev,i dH/dq_i > 0, else 1
         H = sum_i (q_max,i - q_min,i)^2 / (4 (q_max,i - q_i) (q_i - q_min,i))
 
-    J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s, v_prev what was
-    applied before (unknown: w = 1). From the limit outwards w is infinite; w = 1 for a joint that
-    has not both limits. Does the task exactly where the other joints can, and pushes no joint away
-    from its limit, unlike `joint-centering`; v jumps where a joint turns round, a joint at rest is
-    free to pass its limit, and a square J leaves nothing to choose. Keeps no limit; other tasks and
-    weights play no part.
+    J (m, nv) and V (m,) are the primary task's, in the task frame; v in rad/s, v_prev the
+    velocity applied last (unknown: w = 1). At and beyond the limit w is infinite; w = 1 for a joint
+    without both limits. Does the task exactly where the other joints can and, unlike
+    `joint-centering`, pushes no joint away from its limit. v jumps where a joint reverses, a joint
+    at rest can pass its limit, and a square J leaves no choice. Keeps no limit; ignores other tasks
+    and weights.
 
     Attributes:
         damping: lambda, unsquared (units of J); 0 by default: the task exactly.
@@ -47,12 +47,12 @@ class WeightedLeastNorm(Parameters):
 
 
 def mobility(to_lower: Array, to_upper: Array, v_prev: Array) -> Array:
-    """1/w, (nv,), from the distances to the limits and the motion before, (nv,) each."""
+    """Compute 1/w, (nv,), from the distances to the limits and the last velocity, (nv,)."""
     with np.errstate(invalid="ignore"):  # infinite distances
         outwards = v_prev * (to_lower - to_upper) > 0
-        room = 4 * (to_lower * to_upper) ** 2
-        slope = (to_lower + to_upper) ** 2 * np.abs(to_lower - to_upper)  # |dH/dq| times room
-        share = room / (room + slope)
+        product = 4 * (to_lower * to_upper) ** 2
+        slope = (to_lower + to_upper) ** 2 * np.abs(to_lower - to_upper)  # |dH/dq| times `product`
+        share = product / (product + slope)
     share[(to_lower <= 0) | (to_upper <= 0)] = 0.0
     limited = np.isfinite(to_lower) & np.isfinite(to_upper)
     return np.where(outwards & limited, share, 1.0)

@@ -28,10 +28,10 @@ class WeightedQp(Parameters):
         s.t.   lo <= v <= hi   (the velocity box: position, velocity and acceleration limits)
                G v <= h        (torques and distances, where the scenario bounds them)
 
-    over all tasks i, with W_i the task's weights (priorities play no part); poses in the task
+    over all tasks i, with W_i the task's weights (ignoring priorities); poses in the task
     frame; v in rad/s. With no bound active, one task and W = I it is damped least squares.
-    With `log_derivative` both sides of a pose task are multiplied by Jlog6. Keeps every limit; near
-    a limit or a singularity it leaves the course to do so.
+    With `log_derivative` both sides of a pose task are multiplied by Jlog6. Keeps every limit, with
+    direction errors near a limit or a singularity.
 
     Attributes:
         damping: lambda, unsquared; not zero by default, else the minimiser is not unique on a
@@ -56,11 +56,11 @@ class WeightedQp(Parameters):
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
         first, *others = problem.tasks
-        P, wanted = first.normal_equations(log_derivative=self.log_derivative)
+        P, pull = first.normal_equations(log_derivative=self.log_derivative)
         P = P + scaled_identity(problem.robot.nv, self.damping**2)
         for task in others:
-            square, pull = task.normal_equations(log_derivative=self.log_derivative)
-            P = P + square
-            wanted = wanted + pull
+            H, g = task.normal_equations(log_derivative=self.log_derivative)
+            P = P + H
+            pull = pull + g
         box = problem.box(self.braking, self.position_gain)
-        return solve(QuadraticProgram(P, -wanted, problem.G, problem.h, lb=box.lower, ub=box.upper))
+        return solve(QuadraticProgram(P, -pull, problem.G, problem.h, lb=box.lower, ub=box.upper))

@@ -1,6 +1,6 @@
-"""The scenario families, one per file: parameters -> a Scenario that certifies its own difficulty.
+"""The scenario families, one per file: parameters -> a scenario with a certificate.
 
-A new family is a file beside these and a line in this table.
+A new family is a file in this package and a line in this table.
 """
 
 from __future__ import annotations

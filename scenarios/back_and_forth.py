@@ -1,4 +1,4 @@
-"""pink_bench's back and forth: a wide sweep of position and orientation, again and again."""
+"""The trajectory of pink_bench: a wide sweep of position and orientation, back and forth."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ from dikbench.scenario import (
     usual_claims,
 )
 
-START = np.array([0.4, 0.8, 0.4])
-STOP = np.array([-0.4, 0.6, 0.6])
-DURATION = 10.0
+START_M = np.array([0.4, 0.8, 0.4])
+STOP_M = np.array([-0.4, 0.6, 0.6])
+DURATION_S = 10.0
 
 
 @dataclass(frozen=True)
 class SetUp:
-    """How a robot does it.
+    """The path and certificate of a robot.
 
     Attributes:
         frame: its task frame.
-        scale: by which the path is made smaller.
-        roll: of the target orientation about x [rad].
+        scale: scale of the path.
+        roll: roll of the target orientation about x [rad].
         near: a configuration near the start of the path [rad].
-        speed: least and largest peak of the joint motion over the limits.
-        sigma_min: smallest singular value on the path, at least (m, rad).
+        speed: bounds on the peak joint speed over the limits.
+        sigma_min: smallest singular value on the path (m, rad).
     """
 
     frame: str
@@ -74,9 +74,9 @@ class BackAndForth(Family):
         p = scale (start + (stop - start) sin^2 t),
         R = Rz(pi/4 (1 + sin^2 t)) Rx(pi/4 sin^2 t) R_t
 
-    with start (0.4, 0.8, 0.4) m, stop (-0.4, 0.6, 0.6) m. UR3, UR5 and UR10 do it with the frame
-    `ee_link`, R_t = I and scale 0.5, 0.9, 1.0; the Panda with `panda_hand`, Rx(pi/2) and 0.7. The
-    original lets the arms go to the path from afar; here they start on it. A seed turns the whole
+    with start (0.4, 0.8, 0.4) m, stop (-0.4, 0.6, 0.6) m. UR3, UR5 and UR10 have the frame
+    `ee_link`, R_t = I and scale 0.5, 0.9, 1.0; the Panda `panda_hand`, Rx(pi/2) and 0.7. In the
+    original the arms first move to the path; here they start on it. A seed turns the whole
     path about the vertical by up to 0.2 rad and changes its pace by up to 10 %.
 
     Provokes: a wide and steady sweep, inside all limits
@@ -84,7 +84,7 @@ class BackAndForth(Family):
     Shows in: position_error_rms_m, orientation_error_rms_rad
 
     Attributes:
-        robot: one of these, with its own frame.
+        robot: one of these robots, with its own frame.
 
     Source: pink_bench (Caron), back-and-forth trajectory.
     """
@@ -99,7 +99,7 @@ class BackAndForth(Family):
         """See `Family`."""
         where = SET_UPS[self.robot]
         arm = replace(robot, frame=where.frame)
-        # A bend of the path about any other axis would lead out of reach.
+        # A rotation of the path about another axis would leave the reach.
         yaw = float(pin.log3(change.rotation(arm))[2])
         reference = _path(where, yaw, change.pace)
         q0 = solve_placement(arm, reference.placement(0.0), np.array(where.near))
@@ -121,8 +121,8 @@ class BackAndForth(Family):
 
 def _path(where: SetUp, yaw: float, pace: float) -> Reference:
     turned, target = pin.utils.rotate("z", yaw), pin.utils.rotate("x", where.roll)
-    first = turned @ (where.scale * START)
-    way = turned @ (where.scale * (STOP - START))
+    first = turned @ (where.scale * START_M)
+    offset = turned @ (where.scale * (STOP_M - START_M))
     up, forward = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
 
     def rotation(share: float) -> Array:
@@ -133,15 +133,15 @@ def _path(where: SetUp, yaw: float, pace: float) -> Reference:
 
     def placement(tau: float) -> Any:
         share = float(np.sin(tau / pace)) ** 2
-        return pin.SE3(rotation(share) @ target, first + share * way)
+        return pin.SE3(rotation(share) @ target, first + share * offset)
 
     def velocity(tau: float) -> Array:
         share = float(np.sin(tau / pace)) ** 2
         rate = float(np.sin(2 * tau / pace)) / pace
         inclined = rotation(share)
         # Rz(a) Rx(b) turns at a' about the vertical and at b' about its own x.
-        world = np.array([way, pi / 4 * (up + inclined @ forward)])
+        world = np.array([offset, pi / 4 * (up + inclined @ forward)])
         twist: Array = rate * (world @ inclined @ target).ravel()
         return twist
 
-    return Reference(pace * DURATION, placement, velocity, period=pace * pi)
+    return Reference(pace * DURATION_S, placement, velocity, period=pace * pi)

@@ -1,4 +1,4 @@
-"""A user's own robot and file of target poses."""
+"""Target poses from a user's file, with any robot."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ class CsvPoses(Family):
 
     Columns t [s], x, y, z [m], qx, qy, qz, qw (a unit quaternion), in the world, a row per pose;
     between two rows the target moves along the screw from one to the other at constant speed. The
-    run starts on the first pose, in the posture that is found from the robot's own start. The
-    certificate states what the file asks for; it asserts that every pose can be reached and that
-    the start is inside the limits. A seed changes the pace by up to 10 %.
+    run starts on the first pose, in the posture found from the robot's own start. The certificate
+    claims that every pose can be reached and that the start is inside the limits, and states the
+    required speed and the smallest singular value. A seed changes the pace by up to 10 %.
 
     Provokes: what its file does
 
@@ -75,7 +75,7 @@ def _followed(
     times: list[float],
     file: str,
 ) -> Array:
-    """Configurations (k + 1, nq) along the path, the first from the robot's own start."""
+    """Solve configurations (k + 1, nq) along the path, the first from the robot's start."""
     q = [arm.q0]
     for tau in instants:
         try:
@@ -84,7 +84,7 @@ def _followed(
             row = min(bisect_right(times, tau), len(times) - 1)
             line = poses.lines[row if tau > 0 else 0]
             raise DikbenchError(
-                f"pose file {file}, line {line}: out of reach of robot {arm.name}, the pose or the "
-                f"way to it (at {tau:.3g} s)"
+                f"pose file {file}, line {line}: the pose or the path to it is out of reach of "
+                f"robot {arm.name} (at {tau:.3g} s)"
             ) from None
     return np.array(q[1:])

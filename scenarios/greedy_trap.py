@@ -1,4 +1,4 @@
-"""A goal whose shortest way leads out of a joint's range, while the long way is free."""
+"""A goal whose shortest path leads out of a joint's range, while the long path is free."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from dikbench.scenario import (
     target_at_rest,
 )
 
-CALM = 0.8
-"""Peak speed of the way round over the velocity limit."""
+PEAK_SPEED_SHARE = 0.8
+"""Peak speed of the long path over the velocity limit."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,17 +31,17 @@ class GreedyTrap(Family):
     """A local minimum by design: one joint with limits 0 and 2 pi, its goal the other way round.
 
     From q = start the orientation of q = goal is nearer through 0, where the limit is, than through
-    pi: a law that follows the error sticks at 0, and no tuning helps it. There is a motion that
-    arrives, inside all limits: the long way, start + (goal - start) sin^2(pi t/(2 T)). A seed moves
+    pi: a formulation that follows the error gets stuck at 0, whatever its parameters. The long path
+    reaches the goal inside all limits: start + (goal - start) sin^2(pi t/(2 T)). A seed moves
     the start by up to 0.2 rad and the goal by up to 0.2 rad.
 
-    Provokes: a local minimum, in which every law that follows the error sticks
+    Provokes: a local minimum, in which every formulation that follows the error gets stuck
 
     Shows in: orientation_error_final_rad, stuck_share
 
     Attributes:
-        start: of the joint.
-        goal: of the joint.
+        start: start of the joint.
+        goal: goal of the joint.
 
     Source: by construction; the limits of every greedy method.
     """
@@ -59,14 +59,15 @@ class GreedyTrap(Family):
         q0 = change.posture(robot, np.array([self.start]))
         turned = self.goal + float(pin.log3(change.rotation(robot))[2])
         assert robot.limits.velocity is not None
-        way = turned - q0
-        duration = pi * float(way[0]) / (2 * CALM * float(robot.limits.velocity.upper[0]))
+        offset = turned - q0
+        fastest = PEAK_SPEED_SHARE * float(robot.limits.velocity.upper[0])
+        duration = pi * float(offset[0]) / (2 * fastest)
 
-        def way_round(tau: float) -> Array:
-            q: Array = q0 + way * np.sin(pi / 2 * min(tau / duration, 1.0)) ** 2
+        def long_path(tau: float) -> Array:
+            q: Array = q0 + offset * np.sin(pi / 2 * min(tau / duration, 1.0)) ** 2
             return q
 
-        motion = joint_oracle(robot, way_round, samples(duration, self.dt))
+        motion = joint_oracle(robot, long_path, samples(duration, self.dt))
         target = placement_of(robot, np.array([turned]))
         shortest = float(pin.log3(placement_of(robot, q0).rotation.T @ target.rotation)[2])
         missed = float(np.abs(pin.log6(target.actInv(placement_of(robot, motion.q[-1]))).np).max())

@@ -24,18 +24,18 @@ from dikbench.scenario import (
     through,
 )
 
-RADIUS = 0.2
+RADIUS_M = 0.2
 
 
 @dataclass(frozen=True)
 class SetUp:
-    """Where a robot starts and where its hexagon lies.
+    """The start of a robot and the place of its hexagon.
 
     Attributes:
         start: configuration [rad].
-        centre: of the hexagon [m].
-        required: peak joint speed of the least-norm motion over the limits, per m/s along the path,
-            at least.
+        centre: centre of the hexagon [m].
+        required: lower bound on the peak joint speed of the least-norm motion over the limits, per
+            m/s along the path.
     """
 
     start: tuple[float, ...]
@@ -53,24 +53,23 @@ SET_UPS: Mapping[str, SetUp] = MappingProxyType(
 
 @dataclass(frozen=True, kw_only=True)
 class Hexagon(Family):
-    """The position follows a hexagon at constant speed, orientation free: a redundant arm's test.
+    """The position follows a hexagon at constant speed; the orientation is free.
 
-    A straight line from the start to the top of a hexagon of radius 0.2 m, then round it clockwise
-    from corner to corner, all at the same speed: in the y-z plane about (0.1, 0.35, 0.6235) m, from
+    A straight line from the start to the top of a hexagon of radius 0.2 m, then clockwise from
+    corner to corner, all at the same speed: in the y-z plane about (0.1, 0.35, 0.6235) m, from
     (0, 45, 45, 45, 0, 0, 0) deg, for the LWR; in the x-y plane about (0.7, 0) m, from
-    (0, 90, -90, 90) deg, for the planar arm. The least-norm motion leaves the joints' range and, as
-    the speed grows, their speeds: only the null space can help. The original steers for a corner
-    until it is near, with the speed along the line as its parameter; here the same lines are
-    indexed by time, so that every law is asked for the same. A seed moves the start by up to
-    0.05 rad per joint.
+    (0, 90, -90, 90) deg, for the planar arm. The least-norm motion leaves the joints' ranges and,
+    at higher speeds, exceeds their velocity limits: only the null space can keep the limits. In the
+    original each corner is the target until it is near; here the same lines are indexed by time, so
+    that every formulation has the same targets. A seed moves the start by up to 0.05 rad per joint.
 
     Provokes: position and velocity limits that only the null space can keep
 
     Shows in: position_violation_max_rad, velocity_violation_max_rad_s, progress_mean
 
     Attributes:
-        robot: one of these.
-        speed: along the path.
+        robot: one of these robots.
+        speed: speed along the path.
         laps: number of laps.
 
     Source: Flacco, De Luca & Khatib 2012, 2015.
@@ -90,7 +89,7 @@ class Hexagon(Family):
         where, tracking = SET_UPS[self.robot], PositionTask(gain=self.gain)
         q0 = change.posture(robot, np.array(where.start))
         reference = _path(robot, q0, np.array(where.centre), self.speed, self.laps)
-        # Close together: the least-norm motion of the LWR passes a singularity of its position.
+        # Many samples: the least-norm motion of the LWR passes a singularity of its position.
         motion = self.exact_motion(robot, reference, q0, tracking, most=800)
         fastest, required = motion.peak_speed_ratio, where.required * self.speed
         claims = (
@@ -104,11 +103,12 @@ class Hexagon(Family):
 def _path(arm: Robot, q0: Array, centre: Array, speed: float, laps: int) -> Reference:
     start = placement_of(arm, q0)
     angles = pi / 2 - pi / 3 * np.arange(6 * laps + 1)
-    corners = centre + RADIUS * np.stack([np.cos(angles), np.sin(angles)], axis=1) @ plane_of(arm).T
+    circle = RADIUS_M * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    corners = centre + circle @ plane_of(arm).T
     points = np.vstack([start.translation, corners])
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     times = np.concatenate([[0.0], np.cumsum(lengths) / speed])
     path = through(
         times.tolist(), [pin.SE3(start.rotation, point) for point in points], smooth=False
     )
-    return replace(path, period=6 * RADIUS / speed, first_lap=float(times[1]))
+    return replace(path, period=6 * RADIUS_M / speed, first_lap=float(times[1]))

@@ -1,10 +1,10 @@
-"""Hold still for ten seconds, where that is easy and where it is not."""
+"""Hold still for ten seconds at the start, near a singularity or near a limit."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import atan, inf, pi
+from math import inf, pi
 from types import MappingProxyType
 from typing import Annotated, Literal
 
@@ -23,24 +23,22 @@ from dikbench.scenario import (
     samples,
     target_at_rest,
 )
+from scenarios.singular_postures import PANDA_STRETCHED_RAD
 
-DURATION = 10.0
+DURATION_S = 10.0
 
-NEAR = 0.003
-"""How far from a singularity or inside its limit a joint stands [rad]: noise makes up for it."""
-
-STRETCHED = -(atan(0.0825 / 0.316) + atan(0.0825 / 0.384))
-"""Where the Panda's elbow is [rad]: lengths of its arm, offsets of its elbow [m]."""
+NEAR_RAD = 0.003
+"""Distance of a joint from a singularity or its limit, which noise can exceed."""
 
 
 @dataclass(frozen=True)
 class Postures:
-    """Where a robot can stand.
+    """The postures of a robot.
 
     Attributes:
         singular: a posture next to a singularity [rad].
-        fixed: the joints (indices into v) that put it there, which a seed leaves alone.
-        joint: the joint that stands next to its upper limit, the others as at the start.
+        fixed: the joints (indices into v) that make it singular, which a seed does not move.
+        joint: the joint next to its upper limit; the others are as at the start.
     """
 
     singular: tuple[float, ...]
@@ -48,11 +46,12 @@ class Postures:
     joint: int
 
 
-_UR = Postures((0.3, -1.2, 1.4, -1.0, NEAR, 0.2), (4,), 0)
+_PANDA = (0.0, 0.3, 0.0, PANDA_STRETCHED_RAD - NEAR_RAD, 0.0, 1.6, pi / 4)
+_UR = Postures((0.3, -1.2, 1.4, -1.0, NEAR_RAD, 0.2), (4,), 0)
 
 POSTURES: Mapping[str, Postures] = MappingProxyType(
     {
-        "panda": Postures((0.0, 0.3, 0.0, STRETCHED - NEAR, 0.0, 1.6, pi / 4), (2, 3, 4), 5),
+        "panda": Postures(_PANDA, (2, 3, 4), 5),
         "ur3": _UR,
         "ur5": _UR,
         "ur10": _UR,
@@ -63,29 +62,29 @@ RANGES: Mapping[str, tuple[tuple[float, float], tuple[float, float]]] = MappingP
     {
         "start": ((0.08, inf), (0.3, inf)),
         "singular": ((1e-4, 2e-3), (0.3, inf)),
-        "limit": ((0.08, inf), (0.9 * NEAR, 1.1 * NEAR)),
+        "limit": ((0.08, inf), (0.9 * NEAR_RAD, 1.1 * NEAR_RAD)),
     }
 )
-"""Of the smallest singular value (m, rad) and of the position margin [rad], by posture."""
+"""Ranges of the smallest singular value (m, rad) and of the position margin [rad], by posture."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class HoldStill(Family):
-    """Hold the pose of the start for 10 s: nothing should move, and what does is the law's doing.
+    """Hold the pose of the start for 10 s: any motion comes from the formulation.
 
     At the robot's start, or with a joint 0.003 rad from a singularity (a UR's wrist, the Panda's
-    elbow) or from its limit. Measured exactly, every law stands still. Noise on q
-    (`ideal[noise=0.003]`) makes an error that lies in the range of J, which a singularity that is
-    farther away than the noise does not magnify; one that is as near does, at second order, and a
-    limit that is as near seems to be broken. A seed moves the other joints by up to 0.1 rad.
+    elbow) or from its limit. With an exact measurement every formulation stands still. Noise on q
+    (`ideal[noise=0.003]`) gives an error in the range of J, which a singularity farther away than
+    the noise does not amplify; one as near does, at second order, and a limit as near seems to be
+    violated. A seed moves the other joints by up to 0.1 rad.
 
     Provokes: drift and chatter, given a plant with noise or delay
 
     Shows in: velocity_peak_ratio, joint_travel_rad, direction_error_max_rad
 
     Attributes:
-        robot: one of these.
-        posture: where the robot stands.
+        robot: one of these robots.
+        posture: the posture that is held.
 
     Source: by construction; why damping: Wampler 1986, Nakamura & Hanafusa 1986.
     """
@@ -99,13 +98,13 @@ class HoldStill(Family):
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """See `Family`."""
         q0 = self._posture(robot, change)
-        motion = joint_oracle(robot, lambda tau: q0, samples(DURATION, self.dt, most=2))
+        motion = joint_oracle(robot, lambda tau: q0, samples(DURATION_S, self.dt, most=2))
         sigma_min, margin = RANGES[self.posture]
         claims = (
             Claim("smallest singular value (m, rad)", motion.sigma_min.min(), *sigma_min),
             Claim("position margin [rad]", motion.margin.min(), *margin),
         )
-        reference = target_at_rest(placement_of(robot, q0), DURATION)
+        reference = target_at_rest(placement_of(robot, q0), DURATION_S)
         return Case(reference, q0, motion, claims, v0=np.zeros(robot.nv))
 
     def _posture(self, robot: Robot, change: Perturbation) -> Array:
@@ -116,7 +115,7 @@ class HoldStill(Family):
         if self.posture == "limit":
             position = robot.limits.position
             if position is None:
-                raise DikbenchError(f"robot {robot.name} has no limits")
+                raise DikbenchError(f"robot {robot.name} has no position limits")
             q0 = q0.copy()
-            q0[where.joint] = position.upper[where.joint] - NEAR
+            q0[where.joint] = position.upper[where.joint] - NEAR_RAD
         return q0

@@ -1,4 +1,4 @@
-"""A humanoid that stands and draws: feet, hand, centre of mass and posture, all at once."""
+"""A humanoid that stands and draws, with tasks for feet, hand, centre of mass and posture."""
 
 from __future__ import annotations
 
@@ -36,17 +36,16 @@ from dikbench.scenario import (
     usual_claims,
 )
 
-FEET = ("left_sole_link", "right_sole_link")
-SOLE = (0.205, 0.122)
-"""Length and width of a foot [m], from Talos' SRDF."""
+FEET_FRAMES = ("left_sole_link", "right_sole_link")
+SOLE_SIZE_M = (0.205, 0.122)
+"""Length and width of a foot, from Talos' SRDF."""
 
-FEET_GAIN = 0.5
-"""Share of its error that a foot is to be put back by in a control step (stable up to a delay of
-two steps)."""
+FEET_GAIN_PER_STEP = 0.5
+"""Share of a foot's error that is corrected per control step (stable up to a delay of two
+steps)."""
 
 FEET_WEIGHT = 100.0
-"""For laws that weigh tasks of one level, or all: a foot that slips is worse than a hand that is
-late."""
+"""Weight relative to the hand's, for formulations that weigh tasks: slipping feet are worse."""
 
 CENTRE_WEIGHT = 1e-2
 
@@ -55,26 +54,24 @@ CENTRE_WEIGHT = 1e-2
 class Humanoid(Family):
     """A humanoid on both feet draws a circle with its right hand: 36 velocities, four tasks.
 
-    The base is free: nothing but the two pose tasks at the feet, of the same priority as the hand's
-    (and a hundred times its weight, for laws that weigh), keeps the robot where it is. Below them
-    the centre of mass stays where it is at the start, below that the posture. The hand goes round
-    upwards from the start, radius (sin w tau, 1 - cos w tau) in the world's y-z plane, its
-    orientation held; w follows from the least-norm joint motion that does so with the feet in
-    place. A seed moves the joints of the arms by up to 0.1 rad and turns the plane by up to
-    0.2 rad.
+    The base is free: only the two pose tasks of the feet, of the same priority as the hand's (and a
+    hundred times its weight, for formulations that weigh), keep the robot in place. Below them the
+    centre of mass stays as at the start, below that the posture. The hand moves on a circle upwards
+    from the start, radius (sin w tau, 1 - cos w tau) in the world's y-z plane, with fixed
+    orientation; w follows from the least-norm joint motion with the feet in place. A seed moves the
+    joints of the arms by up to 0.1 rad and turns the plane by up to 0.2 rad.
 
     Provokes: feet that slip, on a robot with a free base and many more joints than tasks
 
     Shows in: second_task_error_rms, position_error_max_m, orientation_error_max_rad
 
-    The second tasks are the feet and the centre of mass: their errors stand together in
-    `second_task_error_rms`.
+    The second tasks are the feet and the centre of mass; `second_task_error_rms` is of both.
 
     Attributes:
-        speed: peak of the reference's joint motion over the limits.
-        radius: of the circle.
+        speed: peak of the exact joint motion over the limits.
+        radius: radius of the circle.
         laps: number of laps.
-        gain: of the tracking task and of the centre of mass.
+        gain: gain of the tracking task and of the centre of mass.
 
     Source: Escande, Mansard & Wieber 2014 (humanoids as hierarchies of tasks).
     """
@@ -93,7 +90,7 @@ class Humanoid(Family):
         model = robot.model
         arms = [model.joints[k].idx_v for k, name in enumerate(model.names) if "arm" in name]
         q0 = change.posture(robot, robot.q0, tuple(k for k in range(robot.nv) if k not in arms))
-        feet = _feet(robot, q0, FEET_GAIN / self.dt)
+        feet = _feet(robot, q0, FEET_GAIN_PER_STEP / self.dt)
         tracking = PoseTask(gain=self.gain)
         together = TrackingTogether(tracking, feet)
         plane = change.rotation(robot) @ plane_of(robot)
@@ -118,29 +115,31 @@ class Humanoid(Family):
 
 
 def _feet(body: Robot, q0: Array, gain: float) -> tuple[PoseTask, ...]:
-    """The tasks of feet that stay where they are at the start."""
+    """Make the tasks of feet that stay where they are at the start."""
     return tuple(
         PoseTask(placement, gain, FEET_WEIGHT, 1, foot)
-        for foot, placement in zip(FEET, _soles(body, q0), strict=True)
+        for foot, placement in zip(FEET_FRAMES, _soles(body, q0), strict=True)
     )
 
 
 def _soles(body: Robot, q: Array) -> list[Any]:
-    """The placements of the feet (`pinocchio.SE3`)."""
-    return [placement_of(replace(body, frame=foot), q) for foot in FEET]
+    """Compute the placements of the feet (`pinocchio.SE3`)."""
+    return [placement_of(replace(body, frame=foot), q) for foot in FEET_FRAMES]
 
 
 def _measured(
     body: Robot, motion: OracleMotion, together: TrackingTogether
 ) -> tuple[float, float, float]:
-    """Of a motion with the feet in place: what its certificate says of the whole body.
+    """Measure what the certificate says of the whole body, with the feet in place.
 
-    The smallest singular value of the stacked Jacobian of hand and feet (m, rad); the farthest that
-    a foot is from its place (m, rad); how far the centre of mass stays inside the rectangle about
-    the soles [m], which stand side by side in the axes of the world.
+    Returns:
+        The smallest singular value of the stacked Jacobian of hand and feet (m, rad); the largest
+        error of the feet (m, rad); the smallest distance of the centre of mass inside the rectangle
+        about the soles [m], which is aligned with the axes of the world.
     """
     soles = np.array([X.translation[:2] for X in _soles(body, motion.q[0])])
-    lower, upper = soles.min(axis=0) - np.array(SOLE) / 2, soles.max(axis=0) + np.array(SOLE) / 2
+    half = np.array(SOLE_SIZE_M) / 2
+    lower, upper = soles.min(axis=0) - half, soles.max(axis=0) + half
     kinematics, sigma, slip, room = Kinematics(body), [], [], []
     hand = len(body.task_rows)
     for q in motion.q:

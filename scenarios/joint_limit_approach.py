@@ -1,4 +1,4 @@
-"""A joint that is driven at its limit at speed, with little deceleration to stop it."""
+"""A joint that moves towards its limit fast, with little deceleration to stop it."""
 
 from __future__ import annotations
 
@@ -22,35 +22,36 @@ from dikbench.scenario import (
 )
 
 JOINTS = {"pan": 0, "wrist_3": 5}
-"""Whose motion no other joint can make: the arms have six joints, and are not singular here."""
+"""Joints whose motion no other joint replaces: the arms have six joints and are not singular
+here."""
 
-POSTURE = (0.0, -1.2, 1.4, -1.7, -1.4, 0.2)
+POSTURE_RAD = (0.0, -1.2, 1.4, -1.7, -1.4, 0.2)
 
-ROOM = 1.25
-"""The motion starts this many braking distances before the limit."""
+BRAKING_DISTANCES = 1.25
+"""Braking distances from the start of the motion to the limit."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class JointLimitApproach(Family):
-    """A joint that is driven towards its limit, and beyond, at a share of its velocity limit.
+    """A joint that moves towards its limit and beyond, at a share of its velocity limit.
 
     The joint moves at a constant rate v = speed v_max, from 1.25 braking distances v^2/(2 a) (and
-    at least 0.3 rad) before its upper limit to `depth` beyond it, or further, for as long as who
-    brakes in time takes to stop; all others stand still, and the task frame is asked to follow.
-    Acceleration limits of a [rad/s^2] are in force on every joint.
-    Who looks one step ahead brakes too late: in the end the position or the acceleration limit
-    gives way. A seed moves the other joints by up to 0.1 rad and changes the rate by up to 5 %.
+    at least 0.3 rad) before its upper limit to `depth` beyond it, or further until a joint that
+    brakes in time has stopped; the others rest, and the task frame follows. Acceleration limits of
+    a [rad/s^2] are in force on every joint. A formulation that looks one step ahead brakes too late
+    and violates the position or the acceleration limit. A seed moves the other joints by up to 0.1
+    rad and changes the rate by up to 5 %.
 
     Provokes: braking before a position limit with little deceleration
 
     Shows in: position_violation_max_rad, acceleration_violation_max_rad_s2, relaxed_share
 
     Attributes:
-        robot: one of these.
+        robot: one of these robots.
         joint: pan (the first) or wrist_3 (the last).
         deceleration: a.
-        speed: of the joint over its limit.
-        depth: how far beyond the limit the path goes at least.
+        speed: speed of the joint over its limit.
+        depth: smallest distance of the end of the path beyond the limit.
 
     Source: Flacco, De Luca & Khatib 2012; Del Prete 2018 (viability of braking in discrete time).
     """
@@ -75,8 +76,8 @@ class JointLimitApproach(Family):
         assert velocity is not None
         rate = self.speed / change.pace * velocity.upper[j]
         braking = rate**2 / (2 * self.deceleration)
-        start = change.posture(arm, np.array(POSTURE), (j,)).copy()
-        room = max(ROOM * braking, 0.3)
+        start = change.posture(arm, np.array(POSTURE_RAD), (j,)).copy()
+        room = max(BRAKING_DISTANCES * braking, 0.3)
         start[j] = position.upper[j] - room
         out = np.zeros(arm.nv)
         out[j] = rate
@@ -88,7 +89,7 @@ class JointLimitApproach(Family):
         deepest = motion.margin.min()
         claims = (
             Claim("room before the limit over the braking distance", before / braking, 1.0),
-            # Less than half a turn beyond it, or the shortest way to the target is another one.
+            # Less than half a turn beyond it, or the shortest rotation to the target changes.
             Claim("deepest margin of the motion [rad]", deepest, -3.0, -0.8 * self.depth),
             Claim("duration over the time to stop", duration / stopped, at_least=1.0),
             *usual_claims(motion, sigma_min=0.03),

@@ -1,10 +1,10 @@
-"""A path whose own joint motion crosses a position limit and comes back."""
+"""A path whose exact joint motion crosses a position limit and comes back."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import pi
+from math import inf, pi
 from types import MappingProxyType
 from typing import Annotated, Literal
 
@@ -29,10 +29,10 @@ from dikbench.scenario import (
 
 @dataclass(frozen=True)
 class Crossing:
-    """Where a robot meets a limit.
+    """The posture and the joint with which a robot crosses a limit.
 
     Attributes:
-        posture: the other joints' posture [rad] (the crossing joint's own entry is not read).
+        posture: the other joints' posture [rad] (the crossing joint's entry is ignored).
         joint: the joint that crosses its upper limit (index into v).
     """
 
@@ -57,23 +57,23 @@ CROSSINGS: Mapping[str, Crossing] = MappingProxyType(
 
 @dataclass(frozen=True, kw_only=True)
 class JointLimitCrossing(Family):
-    """A path whose own joint motion crosses a position limit and comes back.
+    """A path whose exact joint motion crosses a position limit and comes back.
 
     One joint j moves as q_j(t) = q_max,j - approach + (approach + depth) sin^2(pi t/T), the others
-    stand still, and the task frame is asked to follow: the target is out of reach, by this posture,
-    while q_j is beyond its limit. UR3 and UR5 cross with their base, the UR10 with joint 4, the
-    Panda and Talos with joint 6, TIAGo, xArm7 and LWR with their elbow, the planar arm with its
-    last joint: most of their least-norm motion is this joint's, too, so that no null space spares
-    it. A seed moves the other joints by up to 0.1 rad.
+    rest, and the task frame follows: in this posture the target is out of reach while q_j is beyond
+    its limit. UR3 and UR5 cross with their base, the UR10 with joint 4, the Panda and Talos with
+    joint 6, TIAGo, xArm7 and LWR with their elbow, the planar arm with its last joint: this joint
+    makes most of their least-norm motion, so that the null space does not replace it. A seed moves
+    the other joints by up to 0.1 rad.
 
     Provokes: a path that leads out of a joint's range
 
     Shows in: position_violation_max_rad, direction_error_max_rad
 
     Attributes:
-        robot: one of those above.
-        approach: how far inside the limit the motion starts.
-        depth: how far beyond the limit it goes.
+        robot: one of these robots.
+        approach: distance of the start inside the limit.
+        depth: largest distance beyond the limit.
         speed: peak speed of the joint over its limit.
 
     Source: by construction; limits as in Flacco, De Luca & Khatib 2015.
@@ -113,9 +113,7 @@ class JointLimitCrossing(Family):
         claims = (
             Claim("position margin at the start [rad]", motion.margin[0], 0.9 * self.approach),
             Claim(
-                "deepest margin of the motion [rad]",
-                motion.margin.min(),
-                at_most=-0.8 * self.depth,
+                "deepest margin of the motion [rad]", motion.margin.min(), -inf, -0.8 * self.depth
             ),
             *usual_claims(motion, sigma_min=0.03),
             Claim("its share in the least-norm motion", share, 0.8),

@@ -1,4 +1,4 @@
-"""A base that turns and goes at once, with an orientation that hardly counts."""
+"""A base that turns and translates at once, with a small weight on the orientation."""
 
 from __future__ import annotations
 
@@ -27,25 +27,24 @@ from dikbench.scenario import (
 
 @dataclass(frozen=True, kw_only=True)
 class LogDerivativeDrift(Family):
-    """A square wave of poses for a mobile base: back by `distance`, turned by `turn`, and again.
+    """A square wave of poses for a mobile base: back by `distance` and turned by `turn`, twice.
 
     The target is the start for `hold` seconds, then `distance` behind it with a yaw of `turn`, then
-    the start and the other once more; position has a cost of 1, orientation one of
-    `orientation_cost` (a weight is a cost squared). A law that leaves the derivative of the
-    logarithm out swings wide where damping competes with the small weight; with it the base goes
-    straight. The ideal length of the way is three times the distance. A seed moves start and poses
-    by up to 0.05 (m, rad), turns the direction in which the second pose lies by up to 0.5 rad and
-    changes the times by up to 10 %.
+    both again; the position has a cost of 1, the orientation one of `orientation_cost` (a weight is
+    a cost squared). A formulation without the derivative of the logarithm makes a detour where
+    damping competes with the small weight; with it the base moves straight. The ideal path length
+    is three times the distance. A seed moves start and poses by up to 0.05 (m, rad), turns the
+    direction of the second pose by up to 0.5 rad and changes the times by up to 10 %.
 
-    Provokes: detours of laws that leave out the derivative of the logarithm
+    Provokes: detours of formulations that leave out the derivative of the logarithm
 
     Shows in: path_length_m
 
     Attributes:
-        distance: between the two poses.
-        turn: yaw between them, 2 to 3 rad either way (not pi, where the logarithm is cut).
-        orientation_cost: beside a cost of 1 of the position.
-        hold: how long each pose is wanted.
+        distance: distance between the two poses.
+        turn: yaw between them, 2 to 3 rad either way (not pi, where the logarithm jumps).
+        orientation_cost: cost of the orientation; the position's is 1.
+        hold: time for which each pose is the target.
 
     Source: Caron's note on the logarithm's derivative in Pink (a planar base that drifts).
     """
@@ -73,10 +72,10 @@ class LogDerivativeDrift(Family):
         poses = (first, first * pin.SE3(pin.utils.rotate("z", self.turn), back))
 
         def placement(tau: float) -> Any:
-            return poses[min(int(tau / period + 1e-9), 3) % 2]  # the last one stays to the end
+            return poses[min(int(tau / period + 1e-9), 3) % 2]  # the last one stays until the end
 
         def straight(tau: float) -> Array:
-            """Each leg as a constant motion in x, y and yaw, in half of the time that it has."""
+            """Move each leg at constant rates of x, y and yaw, in half of its time."""
             leg = min(int(tau / period), 3)
             if leg == 0:
                 return q0
@@ -87,12 +86,12 @@ class LogDerivativeDrift(Family):
             return np.array([x, y, np.cos(yaw), np.sin(yaw)])
 
         motion = joint_oracle(robot, straight, samples(4 * period, self.dt))
-        way = np.linalg.norm(np.diff(motion.q[:, :2], axis=0), axis=1).sum() / self.distance
+        length = np.linalg.norm(np.diff(motion.q[:, :2], axis=0), axis=1).sum() / self.distance
         screw = pin.log6(first.actInv(poses[1]))
         weight, detour = self.orientation_cost**2, _length(screw) / self.distance
         claims = (
-            Claim("length of the straight way over the distance", way, 2.99, 3.01),
-            # The detour that the screw makes is what damping widens.
+            Claim("length of the straight way over the distance", length, 2.99, 3.01),
+            # Damping increases the detour of the screw.
             Claim("length of the screw over the distance", detour, 1.15),
             Claim("yaw between the poses [rad]", abs(screw.angular[2]), at_most=3.05),
             Claim("weight of the orientation", weight, at_most=1.01e-6),
@@ -103,6 +102,6 @@ class LogDerivativeDrift(Family):
 
 
 def _length(screw: pin.Motion) -> float:
-    """Length of the way of the origin along a screw motion [m]."""
-    way = np.array([pin.exp6(share * screw).translation for share in np.linspace(0.0, 1.0, 101)])
-    return float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+    """Compute the path length of the origin along a screw motion [m]."""
+    points = np.array([pin.exp6(share * screw).translation for share in np.linspace(0.0, 1.0, 101)])
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())

@@ -35,27 +35,27 @@ from dikbench.scenario import (
 )
 from scenarios.singular_postures import SINGULAR_POSTURES, SingularityName, SingularPosture
 
-MARGIN = 0.05
-"""Least distance of the motion to a position limit [rad]: it is not about limits."""
+POSITION_MARGIN_RAD = 0.05
+"""Smallest distance of the motion from a position limit."""
 
 HALF_LENGTHS: Mapping[Kind, tuple[float, ...]] = MappingProxyType(
     {"crossing": (0.3,), "fold": (0.15, 0.08), "saddle": (0.15, 0.08)}
 )
-"""Half lengths of the path that are tried where none is known (see `SingularPosture`)."""
+"""Half lengths of the path to try where none is known (see `SingularPosture`)."""
 
-CROSSED = Range(0.001, 0.2, "m; rad", also=(0.0,))
-TOUCHED = Range(0.002, 0.05, "m; rad")
-"""How near a path may pass a crossing, and a fold or a saddle."""
+CROSSING_MISS = Range(0.001, 0.2, "m; rad", also=(0.0,))
+FOLD_MISS = Range(0.002, 0.05, "m; rad")
+"""Valid distances from a crossing, and from a fold or a saddle."""
 
-LEAST_GROWTH = 0.01
-"""Of the smallest singular value (m, rad) per rad of the joint that leads out."""
+SMALLEST_GROWTH = 0.01
+"""Smallest growth of sigma_min (m, rad) per rad of the joint that leads out."""
 
-SAMPLES = 100
-"""Of the motion on each side of the nearest point."""
+SAMPLES_PER_SIDE = 100
+"""Samples of the motion on each side of the nearest point."""
 
 
 class _Passage(NamedTuple):
-    """A path past a singularity, the motion that follows it, and what it claims."""
+    """A path past a singularity, the motion that follows it, and their claims."""
 
     reference: Reference
     motion: OracleMotion
@@ -66,11 +66,11 @@ class _Passage(NamedTuple):
 class NearMiss(Family):
     """A path that passes a singularity at the distance `miss` and the speed `speed`.
 
-    At the singular posture q_s, X_s the placement, J = U S V^T the body Jacobian (m, rad), n = u_m
-    the twist that is lost there. A crossing (the wrist of a six-axis arm) is passed along a single
+    At the singular posture q_s, X_s is the placement, J = U S V^T the body Jacobian (m, rad) and
+    n = u_m the lost twist. A crossing (the wrist of a six-axis arm) is passed along a single
     joint's motion d: X(s) = X_s exp6(miss n) exp6(s J d), s in [-s0, s0], n with its largest
-    component negative unless only the other side can be followed; the speed that it asks for grows
-    as speed/miss, while miss = 0 asks for the single joint's own speed. A fold (an elbow) or a
+    component negative unless only the other side can be followed; the required joint speed grows as
+    speed/miss, while miss = 0 requires the single joint's own speed. A fold (an elbow) or a
     saddle (shoulder and wrist of a seven-axis arm) is touched along n from the side to which the
     arm bends: X(s) = X_s exp6((miss + |s|) n), and the speed grows as speed/sqrt(miss). See
     `dikbench.scenario.singularity` for how they are distinguished. A seed moves the joints of the
@@ -81,10 +81,10 @@ class NearMiss(Family):
     Shows in: velocity_peak_ratio, direction_error_max_rad, progress_min
 
     Attributes:
-        singularity: wrist, elbow or shoulder, where the robot's are known; auto: the first of those
-            that are known, else the first one that is found from the robot's start outwards.
-        miss: length of the unit body twist n by which the path misses; at a fold or a saddle 0.002
-            to 0.05.
+        singularity: wrist, elbow or shoulder, where the robot's are known; auto: the first known
+            one, else the first one found from the robot's start outwards.
+        miss: distance from the singularity along the unit body twist n; at a fold or a saddle
+            0.002 to 0.05.
         speed: ds/dt, of the joint (crossing), or along the unit twist n, mostly a translation
             (fold, saddle).
 
@@ -94,7 +94,7 @@ class NearMiss(Family):
     robot: str = "ur5"
     dt: float = 0.005
     singularity: Annotated[Literal["auto", "wrist", "elbow", "shoulder"], Drawn()] = "auto"
-    miss: Annotated[float, CROSSED, Drawn(0.002, 0.05, log=True)] = 0.02
+    miss: Annotated[float, CROSSING_MISS, Drawn(0.002, 0.05, log=True)] = 0.02
     speed: Annotated[float, Range(0.02, 3.0, "rad/s; m/s"), Drawn(0.1, 1.5, log=True)] = 0.5
 
     robots = tuple(SINGULAR_POSTURES)
@@ -106,7 +106,7 @@ class NearMiss(Family):
         if robot.nv < len(robot.task_rows):
             raise DikbenchError(
                 f"robot {robot.name} has {robot.nv} joints, a pose has {len(robot.task_rows)} "
-                "rows: it is singular everywhere"
+                "rows: every posture is singular; valid: an arm with as many joints as rows"
             )
         pace = self.speed / change.pace
         if self.singularity == "auto" and self.robot not in SINGULAR_POSTURES:
@@ -120,7 +120,7 @@ class NearMiss(Family):
 
 
 def _known(robot: str, singularity: SingularityName | Literal["auto"]) -> SingularPosture:
-    """The posture of a name; of `auto`, the robot's first."""
+    """Return the posture of a name; of `auto`, the robot's first."""
     postures = SINGULAR_POSTURES.get(robot, {})
     if singularity == "auto":
         return next(iter(postures.values()))
@@ -133,7 +133,7 @@ def _known(robot: str, singularity: SingularityName | Literal["auto"]) -> Singul
 
 
 def _perturbed(arm: Robot, q: Array, change: Perturbation) -> Singularity:
-    """The singularity next to a singular posture (nq,), moved as the seed says, passed alike."""
+    """Find the singularity next to the posture q (nq,) that the seed moves."""
     nominal, moved = analyse(arm, q), change.posture(arm, q)
     if moved is q:
         return nominal
@@ -141,17 +141,17 @@ def _perturbed(arm: Robot, q: Array, change: Perturbation) -> Singularity:
 
 
 def _first_found(arm: Robot, miss: float, speed: float, change: Perturbation) -> _Passage:
-    """Past the first singular posture, from the robot's start outwards, that certifies."""
+    """Pass the first singular posture, from the robot's start outwards, that certifies."""
     reason = "none is inside the position limits"
-    for q in singular_postures(arm, 2 * MARGIN):
+    for q in singular_postures(arm, 2 * POSITION_MARGIN_RAD):
         try:
             where = _perturbed(arm, q, change)
-        except DikbenchError:  # two singularities in one
+        except DikbenchError:  # it loses two directions
             continue
         for half_length in HALF_LENGTHS[where.kind]:
             try:
                 passage = _passage(arm, where, miss, speed, half_length)
-                Certificate(passage.claims).check()
+                Certificate(passage.claims).check(arm.name)
             except DikbenchError as error:
                 reason = str(error)
                 continue
@@ -165,10 +165,10 @@ def _first_found(arm: Robot, miss: float, speed: float, change: Perturbation) ->
 def _passage(
     arm: Robot, where: Singularity, miss: float, speed: float, half_length: float
 ) -> _Passage:
-    """The first way past a singularity that can be followed inside the position limits."""
+    """Find the first path past a singularity that can be followed inside the limits."""
     if where.kind != "crossing":
-        TOUCHED.check("miss", miss)
-    if where.kind == "crossing" and where.growth.max() < LEAST_GROWTH:
+        FOLD_MISS.check("miss", miss)
+    if where.kind == "crossing" and where.growth.max() < SMALLEST_GROWTH:
         raise DikbenchError("no single joint leads out of the singularity")
     if where.kind == "crossing" and miss == 0:
         return _straight_through(arm, where, speed, half_length)
@@ -184,7 +184,7 @@ def _passage(
             reason = str(error)
             continue
         found.append(_Passage(reference, motion, _claims(arm, where, miss, speed, motion)))
-        if motion.margin.min() >= MARGIN:
+        if motion.margin.min() >= POSITION_MARGIN_RAD:
             return found[-1]
     if not found:
         raise DikbenchError(f"the path cannot be followed: {reason}")
@@ -192,7 +192,7 @@ def _passage(
 
 
 def _straight_through(arm: Robot, where: Singularity, speed: float, half_length: float) -> _Passage:
-    """The motion of the single joint that leads out fastest, from one side to the other."""
+    """Move the single joint that leads out fastest from one side to the other."""
     reference, start = next(_crossings(arm, where, 0.0, speed, half_length))
     q_r, _ = at_constant_rate(arm, start, speed * _way_out(where))
     motion = joint_oracle(arm, q_r, _instants(half_length, 0.0, reference.duration))
@@ -200,7 +200,7 @@ def _straight_through(arm: Robot, where: Singularity, speed: float, half_length:
 
 
 def _way_out(where: Singularity) -> Array:
-    """The unit velocity (nv,) of the joint that makes the smallest singular value grow fastest."""
+    """Return the unit velocity (nv,) of the joint along which sigma_min grows fastest."""
     out = np.zeros(len(where.growth))
     out[np.argmax(where.growth)] = 1.0
     return out
@@ -209,7 +209,7 @@ def _way_out(where: Singularity) -> Array:
 def _crossings(
     arm: Robot, where: Singularity, miss: float, speed: float, half_length: float
 ) -> Iterator[tuple[Reference, Array]]:
-    """Paths along the joint that leads out fastest, on either side, and seeds of their starts."""
+    """Yield paths along the joint that leads out fastest, on either side, and seeds."""
     out, twist = _way_out(where), np.zeros(6)
     twist[list(arm.task_rows)] = where.jacobian @ out
     seed = pin.integrate(arm.model, where.q, -half_length * out)
@@ -221,7 +221,7 @@ def _crossings(
 def _folds(
     arm: Robot, where: Singularity, miss: float, speed: float, half_length: float
 ) -> Iterator[tuple[Reference, Array]]:
-    """The path from inside towards the edge and back, and the two ways to bend for it."""
+    """Yield the path from inside to the edge and back, with each of two ways to bend."""
     inward, half = where.inward * where.lost, half_length / speed
 
     def placement(tau: float) -> Any:
@@ -239,11 +239,11 @@ def _folds(
 
 
 def _instants(half_length: float, miss: float, duration: float) -> Array:
-    """Instants (2 SAMPLES + 1,) [s], dense about the nearest point as the speed is high there."""
+    """Place 201 instants [s], densely about the nearest point, where the speed is high."""
     if miss == 0:
-        return np.linspace(0.0, duration, 2 * SAMPLES + 1)
+        return np.linspace(0.0, duration, 2 * SAMPLES_PER_SIDE + 1)
     end = np.arcsinh(half_length / miss)
-    share = miss / half_length * np.sinh(np.linspace(-end, end, 2 * SAMPLES + 1))
+    share = miss / half_length * np.sinh(np.linspace(-end, end, 2 * SAMPLES_PER_SIDE + 1))
     instants: Array = duration / 2 * (1.0 + share)
     instants[0], instants[-1] = 0.0, duration
     return instants
@@ -253,7 +253,7 @@ def _claims(
     arm: Robot, where: Singularity, miss: float, speed: float, motion: OracleMotion
 ) -> tuple[Claim, ...]:
     sigma, limit = motion.sigma_min, arm.limits.velocity
-    peak, middle = float(np.abs(motion.v).max()), motion.instants[SAMPLES]
+    peak, middle = float(np.abs(motion.v).max()), motion.instants[SAMPLES_PER_SIDE]
     aside = abs(motion.instants[np.argmin(sigma)] - middle) / middle
     near = 0.3 + (2 * miss / (speed * middle) if where.kind == "crossing" else 0.0)
     claims = [
@@ -261,7 +261,9 @@ def _claims(
         Claim("where, from the nearest point (0) to the ends (1)", float(aside), at_most=near),
         Claim("its ratio to the largest one", sigma.min() / sigma.max(), at_most=0.7),
         Claim("smallest singular value at the start (m, rad)", sigma[0], at_least=0.02),
-        Claim("position margin on the path [rad]", motion.margin.min(), at_least=MARGIN),
+        Claim(
+            "position margin on the path [rad]", motion.margin.min(), at_least=POSITION_MARGIN_RAD
+        ),
     ]
     if where.kind != "crossing":
         # The bend z needs curvature z^2 / 2 = miss: dz/dt = speed / sqrt(2 curvature miss).
@@ -272,7 +274,7 @@ def _claims(
         claims.append(Claim("peak joint speed [rad/s]", peak, at_least=least))
     else:
         claims.append(Claim("peak joint speed [rad/s]", peak, at_most=1.2 * speed))
-    apart = _distance_from(where, motion.q[SAMPLES], arm)
+    apart = _distance_from(where, motion.q[SAMPLES_PER_SIDE], arm)
     claims.append(Claim("distance from the singular placement (m, rad)", apart, at_most=0.21))
     if limit is not None:
         claims.append(Claim("required speed over limit", motion.peak_speed_ratio))
@@ -280,5 +282,5 @@ def _claims(
 
 
 def _distance_from(where: Singularity, q: Array, arm: Robot) -> float:
-    """Length (m, rad) of the twist from the singular placement to that of a configuration."""
+    """Compute the twist's length (m, rad) from the singular placement to that of q."""
     return float(np.linalg.norm(pin.log6(where.placement.actInv(placement_of(arm, q))).np))

@@ -1,4 +1,4 @@
-"""An obstacle that the joint motion of a path runs into, by its hand or by its elbow."""
+"""An obstacle that the exact joint motion of a path hits with its hand or elbow."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ Shape = Literal["sphere", "capsule", "box"]
 
 @dataclass(frozen=True)
 class Swing:
-    """How a robot swings past an obstacle.
+    """The swing of a robot past an obstacle.
 
     Attributes:
-        joint: that swings (index into v).
-        amplitude: to either side of the middle [rad].
+        joint: the joint that swings (index into v).
+        amplitude: its offset to either side of the middle [rad].
         middle: posture half way [rad]; None: the robot's start.
     """
 
@@ -53,7 +53,7 @@ class Swing:
 SWINGS: Mapping[Where, Mapping[str, Swing]] = MappingProxyType(
     {
         "hand": {robot: Swing(0, 0.6) for robot in ("panda", "ur3", "ur5", "ur10", "xarm7")},
-        # The shoulder's, in the plane of the arm; its null space turns the elbow out of it.
+        # The shoulder swings in the plane of the arm; the null space turns the elbow out of it.
         "elbow": {
             "panda": Swing(1, 0.8),
             "xarm7": Swing(1, 0.75),
@@ -62,46 +62,46 @@ SWINGS: Mapping[Where, Mapping[str, Swing]] = MappingProxyType(
     }
 )
 
-ELBOW = 4
-"""The joint at the elbow (Pinocchio's index) of the three arms of seven joints."""
+ELBOW_JOINT = 4
+"""Pinocchio's index of the elbow joint of the three arms with seven joints."""
 
-RADIUS = 0.05
-"""Of the obstacle, half the edge of a box [m]."""
+OBSTACLE_RADIUS_M = 0.05
+"""Radius of the obstacle, half the edge of a box."""
 
-POLE = 0.3
-"""Length of the capsule's segment [m]."""
+CAPSULE_LENGTH_M = 0.3
+"""Length of the capsule's segment."""
 
-MARGIN = 0.01
-"""Distance to keep [m]."""
+MARGIN_M = 0.01
+"""Distance to keep."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ObstacleInTheWay(Family):
-    """A path whose own joint motion runs into an obstacle: the hand gives way, or the elbow does.
+    """A path whose exact joint motion hits an obstacle with the hand or the elbow.
 
-    One joint swings past the middle posture and the task frame is asked to follow,
+    One joint swings past the middle posture and the task frame follows,
 
         q(t) = q_m + (2 s - 1) a e_j,   s = u^3 (10 - 15 u + 6 u^2),   u = t/T.
 
-    In the way of the hand: the base swings, and the obstacle is in front of the hand half way, so
-    near that the hand is `depth` inside it: whoever keeps clear leaves the path and comes back. In
-    the way of the elbow (panda, xarm7, lwr): the shoulder swings in the plane of the arm and the
-    obstacle is beside the elbow, in the direction in which the null space moves it; a motion that
-    does the whole task and stays clear exists, and is measured. A sphere or capsule has the radius
+    With `hand` the base swings, and half way the hand is `depth` inside an obstacle in front of it:
+    a motion that keeps clear leaves the path and returns. With `elbow` (panda, xarm7, lwr) the
+    shoulder swings in the plane of the arm and the obstacle is next to the elbow, in the direction
+    in which the null space moves it; a motion that does the whole task and keeps clear exists, and
+    is certified. A sphere or capsule has the radius
     0.05 m, a cube edges of 0.1 m; a capsule points at the robot. The margin is 0.01 m, from
     capsules around the links (see `dikbench.robots.collision.bodies`). A seed moves the middle
     posture by up to 0.03 rad per joint and changes the duration by up to 10 %.
 
-    Provokes: links that run into what stands in their way
+    Provokes: collisions of links with an obstacle
 
     Shows in: distance_min_m, distance_violation_max_m, position_error_max_m
 
     Attributes:
-        robot: one of those above; lwr for the elbow only, ur3, ur5 and ur10 for the hand only.
-        where: what the obstacle is in the way of.
-        shape: of the obstacle.
-        depth: how far inside the obstacle the reference's motion goes.
-        speed: peak of the motion's joint speeds over their limits.
+        robot: one of these robots; lwr with elbow only, ur3, ur5 and ur10 with hand only.
+        where: the part that hits the obstacle.
+        shape: shape of the obstacle.
+        depth: largest depth of the exact motion inside the obstacle.
+        speed: peak joint speed of the exact motion over its limit.
 
     Source: Faverjon & Tournassoud 1987 (obstacles near a manipulator); Maciejewski & Klein 1985
     (the null space of a redundant arm keeps it clear).
@@ -137,7 +137,7 @@ class ObstacleInTheWay(Family):
             influence=influence_distance(acceleration=self.acceleration),
         )
         distance, depth = constraint.distances(robot, motion.q), 0.8 * self.depth
-        claims = collision_claims(motion, distance, MARGIN, depth=depth, speed=self.speed)
+        claims = collision_claims(motion, distance, MARGIN_M, depth=depth, speed=self.speed)
         if self.where == "hand":
             carried = _distance_of_hand(robot, half_way, constraint)
             claims += (Claim("distance of the hand on its path [m]", carried, -0.1, -depth),)
@@ -147,7 +147,7 @@ class ObstacleInTheWay(Family):
             other = measure_motion(robot, motion.instants, q)
             margin, fastest = other.margin.min(), other.peak_speed_ratio
             claims += (
-                Claim("least distance of another motion that does it [m]", clear, MARGIN),
+                Claim("least distance of another motion that does it [m]", clear, MARGIN_M),
                 Claim("position margin of that motion [rad]", margin, at_least=0.05),
                 Claim("required speed of that motion over limit", fastest, at_most=1.0),
             )
@@ -155,19 +155,19 @@ class ObstacleInTheWay(Family):
 
 
 def _swing(arm: Robot, middle: Array, swing: Swing, duration: float) -> tuple[Array, Reference]:
-    """The start (nq,) and the path of the task frame as the joint swings past the middle."""
-    way = np.zeros(arm.nv)
-    way[swing.joint] = swing.amplitude
+    """Compute the start (nq,) and the path of the task frame of a swing past the middle."""
+    offset = np.zeros(arm.nv)
+    offset[swing.joint] = swing.amplitude
 
     def q_r(tau: float) -> Array:
         u = tau / duration
         s = u**3 * (10 - 15 * u + 6 * u**2)
-        q: Array = pin.integrate(arm.model, middle, (2 * s - 1) * way)
+        q: Array = pin.integrate(arm.model, middle, (2 * s - 1) * offset)
         return q
 
     def v_r(tau: float) -> Array:
         u = tau / duration
-        v: Array = 60 * u**2 * (1 - u) ** 2 / duration * way
+        v: Array = 60 * u**2 * (1 - u) ** 2 / duration * offset
         return v
 
     return q_r(0.0), joint_path(arm, q_r, v_r, duration)
@@ -176,7 +176,7 @@ def _swing(arm: Robot, middle: Array, swing: Swing, duration: float) -> tuple[Ar
 def _in_the_way(
     arm: Robot, q: Array, joint: int, where: Where, shape: Shape, depth: float
 ) -> CollisionConstraint:
-    """The obstacle that the motion runs into at q, `depth` inside, and the constraint about it."""
+    """Place the obstacle that the motion enters at q by `depth`, and constrain it."""
     kinematics = Kinematics(arm)
     kinematics.update(q)
     J = kinematics.spatial_jacobian
@@ -193,7 +193,7 @@ def _in_the_way(
 
     def constraint(offset: float) -> CollisionConstraint:
         solid = make(point + offset * away, np.column_stack([along, np.cross(away, along), away]))
-        return CollisionConstraint((solid,), self_collision=False, margin=MARGIN)
+        return CollisionConstraint((solid,), self_collision=False, margin=MARGIN_M)
 
     near, far = 0.0, 0.6
     while far - near > 1e-9:
@@ -204,29 +204,29 @@ def _in_the_way(
 
 
 def _elbow_turn(arm: Robot, q: Array) -> tuple[Array, Array, Array]:
-    """The null space's direction (nv,) in which the elbow goes to the right, elbow, its velocity.
+    """Compute the null-space direction (nv,) of the elbow to the right, elbow, velocity.
 
-    Elbow (3,) [m] and velocity (3,) in the world, whose x axis looks ahead.
+    Elbow (3,) [m] and its velocity (3,) are in the world, whose x axis points forward.
     """
     kinematics = Kinematics(arm)
     kinematics.update(q)
     pin.forwardKinematics(arm.model, arm.scratch, q)
-    elbow = arm.scratch.oMi[ELBOW].translation.copy()
+    elbow = arm.scratch.oMi[ELBOW_JOINT].translation.copy()
     z = null_space(kinematics.jacobian(arm.frame_id), 1e-6)[:, 0]
-    before = slice(0, ELBOW - 1)  # the joints that move it
+    before = slice(0, ELBOW_JOINT - 1)  # the joints that move the elbow
     velocity = _velocity(kinematics.spatial_jacobian[:, before] @ z[before], elbow)
     sign = -np.sign(velocity[1])
     return sign * z, elbow, sign * velocity
 
 
 def _velocity(twist: Array, point: Array) -> Array:
-    """Of a point (3,) that moves with a twist (linear; angular) given at the world's origin."""
+    """Compute the velocity (3,) of a point under a twist given at the world's origin."""
     velocity: Array = twist[:3] + np.cross(twist[3:], point)
     return velocity
 
 
 def _distance_of_hand(arm: Robot, q: Array, constraint: CollisionConstraint) -> float:
-    """The least distance [m] of what the task frame's joint carries, wherever the others are."""
+    """Compute the least distance [m] of what the task frame's joint carries."""
     kinematics, pairs = Kinematics(arm), constraint.pairs(arm)
     kinematics.update(q)
     joint = arm.model.frames[arm.frame_id].parentJoint
@@ -237,10 +237,10 @@ def _distance_of_hand(arm: Robot, q: Array, constraint: CollisionConstraint) -> 
 def _clear_motion(
     arm: Robot, reference: Reference, instants: Array, q0: Array, constraint: CollisionConstraint
 ) -> Array:
-    """Configurations (k + 1, nq) that follow the reference exactly and keep clear, where some do.
+    """Find configurations (k + 1, nq) that follow the reference and keep clear.
 
-    The elbow turns away by as little as it takes, in steps of 0.1, and comes back: the way in the
-    null space goes as sin^2(pi t/T).
+    The elbow turns away by as little as needed, in steps of 0.1, and returns: the offset in
+    the null space is proportional to sin^2(pi t/T). The last motion is returned if none is clear.
     """
     for turn in 0.1 * np.arange(1, 13):
         q = _turned(arm, reference, instants, q0, turn)
@@ -261,15 +261,17 @@ def _turned(arm: Robot, reference: Reference, instants: Array, q0: Array, turn: 
 
 def _sphere(centre: Array, axes: Array) -> Obstacle:
     del axes
-    return SphereObstacle(tuple(centre), RADIUS)
+    return SphereObstacle(tuple(centre), OBSTACLE_RADIUS_M)
 
 
 def _capsule(centre: Array, axes: Array) -> Obstacle:
-    return CapsuleObstacle(tuple(centre), tuple(centre + POLE * axes[:, 2]), RADIUS)
+    return CapsuleObstacle(
+        tuple(centre), tuple(centre + CAPSULE_LENGTH_M * axes[:, 2]), OBSTACLE_RADIUS_M
+    )
 
 
 def _box(centre: Array, axes: Array) -> Obstacle:
-    return BoxObstacle(tuple(centre), (2 * RADIUS,) * 3, tuple(map(tuple, axes)))
+    return BoxObstacle(tuple(centre), (2 * OBSTACLE_RADIUS_M,) * 3, tuple(map(tuple, axes)))
 
 
 _SHAPES: Mapping[Shape, Callable[[Array, Array], Obstacle]] = MappingProxyType(

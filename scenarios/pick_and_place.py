@@ -1,4 +1,4 @@
-"""Approach, grasp, lift, carry, place: what arms are bought for."""
+"""Approach, grasp, lift, carry and place an object."""
 
 from __future__ import annotations
 
@@ -22,29 +22,29 @@ from dikbench.scenario import (
     usual_claims,
 )
 
-SHARES = (0.2, 0.1, 0.05, 0.1, 0.3, 0.1, 0.05, 0.1)
-"""Of the duration: approach, down, grasp (a dwell), lift, carry, down, release (a dwell), up."""
+LEG_DURATION_SHARES = (0.2, 0.1, 0.05, 0.1, 0.3, 0.1, 0.05, 0.1)
+"""Approach, down, grasp (a dwell), lift, carry, down, release (a dwell), up."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PickAndPlace(Family):
-    """Pick something up on one side and place it, turned, on the other; the best case in practice.
+    """Pick an object up on one side and place it, turned, on the other: the usual case.
 
     From the start to above the object, `width`/2 to the side at the same height; `height` down to
     grasp it; a dwell; up again; across by `width`; down; a dwell to release it; up. The frame is
-    turned about the vertical by -turn/2 at the object and +turn/2 where it goes. Every leg begins
-    and ends at rest, in the way of least jerk; the duration follows from `speed`. A seed moves the
-    start by up to 0.05 rad per joint and turns the way across by up to 0.2 rad.
+    turned about the vertical by -turn/2 at the object and +turn/2 at its place. Every leg begins
+    and ends at rest with least jerk; the duration follows from `speed`. A seed moves the start by
+    up to 0.05 rad per joint and turns the direction across by up to 0.2 rad.
 
     Provokes: stops, dwells and starts, inside all limits up to a speed of 1
 
     Shows in: position_error_max_m, orientation_error_max_rad, velocity_violation_max_rad_s
 
     Attributes:
-        width: from the object to its place.
-        height: by which it is lifted.
-        turn: of the object about the vertical.
-        speed: peak of the reference's joint motion over the limits.
+        width: distance from the object to its place.
+        height: height by which it is lifted.
+        turn: rotation of the object about the vertical.
+        speed: peak of the exact joint motion over the limits.
 
     Source: Tedrake, Robotic Manipulation (basic pick and place); least jerk: Flash & Hogan 1985.
     """
@@ -70,7 +70,7 @@ class PickAndPlace(Family):
         return Case(reference, q0, motion, claims)
 
     def _places(self, start: Any, rotation: Array) -> list[Any]:
-        """The placements between the legs, nine of them."""
+        """Compute the nine placements at the ends of the legs."""
         x, y, _ = start.translation
         across = rotation @ np.array([-y, x, 0.0])  # at a right angle to the arm
         across *= self.width / 2 / np.hypot(across[0], across[1])
@@ -87,5 +87,5 @@ class PickAndPlace(Family):
 
 
 def _path(places: list[Any], duration: float) -> Reference:
-    times = duration * np.concatenate([[0.0], np.cumsum(SHARES)])
+    times = duration * np.concatenate([[0.0], np.cumsum(LEG_DURATION_SHARES)])
     return through(times.tolist(), places, smooth=True)

@@ -32,16 +32,16 @@ class Reach(Family):
     (-1, 1, -1)/sqrt(3) and about it; for a planar arm, along (-1, 1)/sqrt(2) and clockwise. A seed
     turns the axis, and moves the start by up to 0.1 rad per joint.
 
-    Provokes: nothing; who fails here fails everywhere
+    Provokes: nothing; a formulation that fails here fails everywhere
 
     Shows in: position_error_final_m, orientation_error_final_rad
 
     Attributes:
-        distance: of the target.
-        angle: of the target.
-        duration: of the run.
+        distance: distance of the target.
+        angle: angle of the target.
+        duration: duration of the run.
 
-    Source: step response; every controller's first test.
+    Source: step response.
     """
 
     gain: float = 2.0

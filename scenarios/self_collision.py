@@ -1,4 +1,4 @@
-"""A path whose own joint motion brings the arm into itself and comes back."""
+"""A path whose exact joint motion brings the arm into itself and back."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from dikbench.scenario import (
     there_and_back,
 )
 
-WAYS: Mapping[str, tuple[float, ...]] = MappingProxyType(
+DISPLACEMENTS: Mapping[str, tuple[float, ...]] = MappingProxyType(
     {
         "panda": (0.0, 1.1, 0.0, -0.5, 0.0, 0.0, 0.0),
         "ur3": (0.0, 0.0, 0.9, 1.4, 0.0, 0.0),
@@ -34,20 +34,20 @@ WAYS: Mapping[str, tuple[float, ...]] = MappingProxyType(
         "talos": (0.0, 0.0, -1.3, -0.6, 0.0, -0.5, 0.0),
     }
 )
-"""From the start into the arm itself [rad]."""
+"""From the start to a posture in which the arm is inside itself [rad]."""
 
-MARGIN = 0.01
-"""Distance to keep [m]."""
+MARGIN_M = 0.01
+"""Distance to keep."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SelfCollision(Family):
-    """A path whose own joint motion brings the arm into itself and comes back.
+    """A path whose exact joint motion brings the arm into itself and back.
 
-    The joints move as q(t) = q_0 + sin^2(pi t/T) d and the task frame is asked to follow: the hand
-    goes into the base (panda, xarm7, tiago), the upper arm (ur3, ur5, ur10, kinova) or the chest
-    (talos), by more than 0.02 m half way, as `dikbench.robots.collision.bodies` measures
-    it; these are capsules around the meshes, so that the true bodies may have some room left. The
+    The joints move as q(t) = q_0 + sin^2(pi t/T) d and the task frame follows: the hand enters the
+    base (panda, xarm7, tiago), the upper arm (ur3, ur5, ur10, kinova) or the chest (talos) by more
+    than 0.02 m half way. Distances are those of capsules around the meshes (see
+    `dikbench.robots.collision.bodies`), so that the true bodies may still be apart. The
     margin is 0.01 m. A seed moves the start by up to 0.03 rad per joint and changes the duration by
     up to 10 %.
 
@@ -56,7 +56,7 @@ class SelfCollision(Family):
     Shows in: distance_min_m, distance_violation_max_m, position_error_max_m
 
     Attributes:
-        robot: one of those above.
+        robot: one of these robots.
         speed: peak of the motion's joint speeds over their limits.
 
     Source: by construction; Kanoun et al. 2011 (self-collision as rows of a program).
@@ -70,14 +70,14 @@ class SelfCollision(Family):
 
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """See `Family`."""
-        way, q0 = np.array(WAYS[self.robot]), change.posture(robot, robot.q0)
-        at_one_second = joint_path(robot, *there_and_back(robot, q0, way, 1.0), 1.0)
+        offset, q0 = np.array(DISPLACEMENTS[self.robot]), change.posture(robot, robot.q0)
+        at_one_second = joint_path(robot, *there_and_back(robot, q0, offset, 1.0), 1.0)
         duration = duration_at(robot, at_one_second, q0, self.speed) * change.pace
-        reference = joint_path(robot, *there_and_back(robot, q0, way, duration), duration)
+        reference = joint_path(robot, *there_and_back(robot, q0, offset, duration), duration)
         motion = self.exact_motion(robot, reference, q0, most=100)
         constraint = CollisionConstraint(
-            margin=MARGIN, influence=influence_distance(acceleration=self.acceleration)
+            margin=MARGIN_M, influence=influence_distance(acceleration=self.acceleration)
         )
         distance = constraint.distances(robot, motion.q)
-        claims = collision_claims(motion, distance, MARGIN, depth=0.02, speed=self.speed)
+        claims = collision_claims(motion, distance, MARGIN_M, depth=0.02, speed=self.speed)
         return Case(reference, q0, motion, claims, constraints=(constraint,))

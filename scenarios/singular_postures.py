@@ -1,4 +1,4 @@
-"""Singular postures of known arms, by name: seeds from which the exact ones are solved."""
+"""Singular postures of known arms, by name: seeds of the exact postures."""
 
 from __future__ import annotations
 
@@ -11,19 +11,21 @@ SingularityName = Literal["wrist", "elbow", "shoulder"]
 
 
 class SingularPosture(NamedTuple):
-    """A posture next to a singular one.
+    """A posture near a singular one.
 
     Attributes:
         posture: joint by joint from the neutral configuration, (nv,) [rad].
-        half_length: s0, half the length of the path past it: rad of a joint at a crossing, else of
-            the unit twist, mostly a translation [m].
+        half_length: s0, half the length of the path past it: [rad] of a joint at a crossing, else
+            along the unit twist, mostly a translation [m].
     """
 
     posture: tuple[float, ...]
     half_length: float
 
 
-_PANDA_STRETCHED = -(atan(0.0825 / 0.316) + atan(0.0825 / 0.384))
+PANDA_STRETCHED_RAD = -(atan(0.0825 / 0.316) + atan(0.0825 / 0.384))
+"""Angle of the Panda's elbow when stretched, from the offsets and lengths of its arm [m]."""
+
 _UR_WRIST = SingularPosture((0.3, -1.2, 1.4, -1.0, 0.0, 0.2), 0.3)
 
 
@@ -41,7 +43,7 @@ SINGULAR_POSTURES: Mapping[str, Mapping[SingularityName, SingularPosture]] = Map
         "ur5": {"wrist": _UR_WRIST, "elbow": _ur_elbow(0.15), "shoulder": _ur_shoulder(0.12)},
         "ur10": {"wrist": _UR_WRIST, "elbow": _ur_elbow(0.15), "shoulder": _ur_shoulder(0.15)},
         "panda": {
-            "elbow": SingularPosture((0.0, 0.3, 0.0, _PANDA_STRETCHED, 0.0, 1.6, pi / 4), 0.15),
+            "elbow": SingularPosture((0.0, 0.3, 0.0, PANDA_STRETCHED_RAD, 0.0, 1.6, pi / 4), 0.15),
             "shoulder": SingularPosture((0.3, 0.0, pi / 2, -1.8, 0.0, 1.6, 0.4), 0.1),
             "wrist": SingularPosture((0.0, 0.3, 0.0, -2.0, pi / 2, 3.364, 0.4), 0.1),
         },
@@ -64,10 +66,10 @@ SINGULAR_POSTURES: Mapping[str, Mapping[SingularityName, SingularPosture]] = Map
         },
     }
 )
-"""The first of a robot is the one that it is asked about by default.
+"""The first posture of a robot is its default.
 
 UR: q5 = 0, q3 = 0, and the wrist's centre on the cylinder about the first axis. Panda: stretched
 with q5 = 0, q2 = q5 = 0 with q3 = pi/2, and q5 = pi/2 with a q6 that depends on q4. The others were
-found by `dikbench.scenario.singularity`; the wrist and shoulder of Talos and the shoulder of TIAGo
-are singular only outside the joints' limits.
+found with `dikbench.scenario.singularity`; the wrist and shoulder of Talos and the shoulder of
+TIAGo are singular only outside the joints' limits.
 """

@@ -1,4 +1,4 @@
-"""A closed curve at a chosen share of what the joints can do."""
+"""A closed curve at a chosen share of the joint velocity limits."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ CURVES: Mapping[str, Callable[..., Reference]] = MappingProxyType(
 
 @dataclass(frozen=True, kw_only=True)
 class SpeedSweep(Family):
-    """A closed curve so fast that its own joint motion peaks at `speed` times the velocity limits.
+    """A closed curve whose exact joint motion peaks at `speed` times the velocity limits.
 
     A circle upwards from the start, radius (sin w tau, 1 - cos w tau), or a lemniscate through it,
     radius (sin w tau, sin(2 w tau) / 2), in the world's y-z plane (a planar arm's own), while the
     frame turns about the normal of the plane by turn sin w tau; w follows from the least-norm joint
-    motion that tracks the first lap exactly. Above 1 that motion breaks the limits (another one may
-    not, where the arm has a null space). A seed moves the start by up to 0.1 rad per joint and
+    motion that tracks the first lap exactly. Above 1 that motion exceeds the limits (another one
+    may not, where the arm has a null space). A seed moves the start by up to 0.1 rad per joint and
     turns the plane by up to 0.2 rad.
 
     Provokes: joint speeds beyond the limits, far from any singularity
@@ -45,8 +45,8 @@ class SpeedSweep(Family):
 
     Attributes:
         path: the curve.
-        speed: rho, peak of the reference's joint motion over the limits.
-        radius: of the circle, half the width of the lemniscate.
+        speed: peak of the exact joint motion over the limits.
+        radius: radius of the circle, half the width of the lemniscate.
         turn: amplitude of the rotation; at 0 the orientation is fixed.
         laps: number of laps.
 

@@ -39,7 +39,7 @@ JOINTS: Mapping[str, int] = MappingProxyType(
         "planar3r": 2,
     }
 )
-"""The joint (index into v) that is outside its upper limit: no null space brings it back."""
+"""The joint (index into v) that is outside its upper limit; the null space does not move it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,22 +47,22 @@ class StartOutside(Family):
     """A start outside a position limit, as after a push or a calibration, and a slow way inside.
 
     One joint stands `outside` beyond its upper limit, the others as at the robot's start; the task
-    frame is to follow q_j(t) = q_max,j + outside - rate t, which is inside after outside/rate
-    seconds; with a rate of 0 it is to stay where it is, and only who gives it up gets inside. Many
-    programs have no feasible point here: libraries raise, stand still or push back. A seed moves
+    frame follows q_j(t) = q_max,j + outside - rate t, which is inside after outside/rate seconds.
+    With a rate of 0 the frame is to rest, and only a direction error leads inside. Many programs
+    have no feasible point here: libraries raise errors, stop or move out. A seed moves
     the other joints by up to 0.05 rad and changes the rate by up to 10 %.
 
-    Provokes: programs without a feasible point, and too hasty ways back
+    Provokes: programs without a feasible point, and too fast ways back
 
     Shows in: infeasible_share, position_violation_max_rad, velocity_peak_ratio
 
     Attributes:
-        robot: one of these.
+        robot: one of these robots.
         outside: distance of the start from the limit.
-        rate: of the joint on the way inside.
-        duration: of the run.
+        rate: speed of the joint towards the inside.
+        duration: duration of the run.
 
-    Source: by construction; what users of Pink and PlaCo ask about.
+    Source: by construction; a question of users of Pink and PlaCo.
     """
 
     robot: Literal[

@@ -36,31 +36,31 @@ DIRECTIONS: Mapping[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = Ma
         "talos": ((0, -1, 0), (-1, 0, -1)),
     }
 )
-"""Where the target lies and about what it is turned, in the axes of the task frame at the start:
-a way on which the arm meets neither a limit nor a singularity."""
+"""Directions of the displacement and of the rotation axis, in the task frame at the start; on the
+screw there the arm meets neither a limit nor a singularity."""
 
-LEAST_FIRST_SPEED = 0.1
-"""First speed over the limits, per gain [1/s] and angle [rad], that a step asks for at least."""
+SMALLEST_FIRST_SPEED = 0.1
+"""Smallest initial speed over the limits that a step requires, per gain [1/s] and angle [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Step(Family):
-    """A step to a target far away and far turned: the first commands ask for too much.
+    """A step to a target far away and far turned: the first commands are too fast.
 
     X_d = (R exp3(angle a), p + distance R d), from the first instant on, with a and d unit vectors
-    in the axes of the frame, chosen for each robot such that the straight way there, the screw
-    X exp6(s log6(X^-1 X_d)), is free. A law without limits begins at gain times the error. A seed
-    moves the start by up to 0.1 rad per joint and turns a and d by up to 0.2 rad.
+    in the axes of the frame, chosen for each robot such that the screw
+    X exp6(s log6(X^-1 X_d)) is free. A formulation without limits starts at gain times the error. A
+    seed moves the start by up to 0.1 rad per joint and turns a and d by up to 0.2 rad.
 
-    Provokes: an error that asks for joint speeds beyond the limits at once
+    Provokes: an error that requires joint speeds beyond the limits at once
 
     Shows in: direction_error_max_rad, velocity_violation_max_rad_s, progress_min
 
     Attributes:
         robot: one of the arms in space.
-        distance: of the target.
-        angle: of the target.
-        duration: of the run.
+        distance: distance of the target.
+        angle: angle of the target.
+        duration: duration of the run.
 
     Source: step response; the screw: Lynch & Park, Modern Robotics, 2017.
     """
@@ -84,6 +84,6 @@ class Step(Family):
         away = start.translation + self.distance * start.rotation @ d
         target = pin.SE3(start.rotation @ pin.exp3(self.angle * a), away)
         way = motion_of_a_step(robot, q0, pin.log6(start.actInv(target)).np, self.gain)
-        least = LEAST_FIRST_SPEED * self.gain * self.angle
+        least = SMALLEST_FIRST_SPEED * self.gain * self.angle
         claims = (*step_claims(way), Claim("first speed over limit", way.speed_ratio[0], least))
         return Case(target_at_rest(target, self.duration), q0, None, claims)

@@ -1,4 +1,4 @@
-"""Two tasks that cannot both be done: the hand's, and a point's on the elbow."""
+"""Two tasks that cannot both be done: the hand's and the elbow's."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ from dikbench.scenario import (
 
 @dataclass(frozen=True)
 class Conflict:
-    """Where a robot's two tasks meet.
+    """The motion and the second task of a robot.
 
     Attributes:
         start: posture at the beginning and the end of the motion, (nv,) [rad].
-        middle: posture half way, in which the second task adds nothing that the first leaves free.
+        middle: posture half way, where the second task loses rank in the null space of the first.
         elbow: the frame of the second task.
-        offset: from the elbow at the start to where it is wanted [m].
-        whole_pose: whether the first task is a pose, else a position.
+        offset: from the elbow at the start to its target [m].
+        whole_pose: whether the first task is a pose or a position.
     """
 
     start: tuple[float, ...]
@@ -59,13 +59,13 @@ class Conflict:
 
 CONFLICTS: Mapping[str, Conflict] = MappingProxyType(
     {
-        # Elbow and hand on one line half way, the elbow wanted farther back than that allows.
+        # Elbow and hand are on one line half way, the elbow's target farther back.
         "planar4r": Conflict(
             (0.5, 0.6, 0.4, 1.0), (0.3, 0.6, 0.4, 0.0), "link2", (-0.065, -0.135, 0), False
         ),
-        # Four rows for three joints: the elbow can never follow by itself.
+        # Four rows for three joints: the elbow never moves independently.
         "planar3r": Conflict((0.4, 0.8, 0.9), (0.4, 0.8, 0.0), "link2", (0.1, -0.1, 0), False),
-        # The elbow is wanted farther from the shoulder than it can be.
+        # The elbow's target is out of its reach from the shoulder.
         "panda": Conflict(
             (0, -pi / 4, 0, -3 * pi / 4, 0, pi / 2, pi / 4),
             (0.2, -pi / 4, 0, -3 * pi / 4 + 0.2, 0, pi / 2, pi / 4),
@@ -76,19 +76,19 @@ CONFLICTS: Mapping[str, Conflict] = MappingProxyType(
     }
 )
 
-SELF_MOTION = 50
-"""Steps towards the elbow's target that the arm makes about a hand at rest."""
+SELF_MOTION_STEPS = 50
+"""Steps of the elbow towards its target while the hand rests."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class TaskConflict(Family):
-    """A hand that moves on, and an elbow that is wanted elsewhere: priorities are put to the test.
+    """A moving hand and an elbow with a target elsewhere, which tests priorities.
 
-    The joints move as q(t) = q_a + (q_b - q_a) sin^2(pi t/T) and the hand is asked to follow, with
-    its position (planar arms) or its pose (Panda); the elbow's point, of second priority, is wanted
-    at a fixed place. Half way the second task has less rank in what the first leaves free than by
-    itself, rank(J_2 N_1) < rank J_2: on planar4r elbow and hand are on one line then, on planar3r
-    and the Panda there are too few joints throughout. A seed moves the start by up to 0.05 rad and
+    The joints move as q(t) = q_a + (q_b - q_a) sin^2(pi t/T) and the hand follows with its position
+    (planar arms) or its pose (Panda); the elbow, of second priority, has a fixed target. Half way
+    the second task has less rank in the null space of the first than by itself,
+    rank(J_2 N_1) < rank J_2: on planar4r elbow and hand are then on one line, on planar3r and the
+    Panda there are always too few joints. A seed moves the start by up to 0.05 rad and
     changes the duration by up to 10 %.
 
     Provokes: algorithmic singularities, and second tasks that leak into the first
@@ -96,9 +96,9 @@ class TaskConflict(Family):
     Shows in: position_error_max_m, second_task_error_rms, velocity_peak_ratio
 
     Attributes:
-        robot: one of these.
-        speed: peak of the motion's own speed over the velocity limits.
-        second_gain: of the elbow's task.
+        robot: one of these robots.
+        speed: peak joint speed of the exact motion over the limits.
+        second_gain: gain of the elbow's task.
 
     Source: Chiaverini 1997 (algorithmic singularities).
     """
@@ -114,12 +114,12 @@ class TaskConflict(Family):
         """See `Family`."""
         where = CONFLICTS[self.robot]
         start = change.posture(robot, np.array(where.start))
-        way = np.array(where.middle) - start
+        offset = np.array(where.middle) - start
         assert robot.limits.velocity is not None
         # The rate of sin^2(pi t/T) peaks at pi/T.
-        fastest = float((np.abs(way) / robot.limits.velocity.upper).max())
+        fastest = float((np.abs(offset) / robot.limits.velocity.upper).max())
         duration = pi * fastest / self.speed * change.pace
-        q_r, v_r = there_and_back(robot, start, way, duration)
+        q_r, v_r = there_and_back(robot, start, offset, duration)
         task = PoseTask if where.whole_pose else PositionTask
         tracking: TrackingTask = task(gain=self.gain)
         kinematics = Kinematics(robot)
@@ -152,9 +152,9 @@ class TaskConflict(Family):
 def _conflict(
     arm: Robot, q: Array, tracking: TrackingTask, second: PositionTask
 ) -> tuple[float, float, float]:
-    """At q: the last of rank J_2 singular values of J_2 N_1 and of J_2; the elbow's error.
+    """Compute sigma_min of J_2 N_1 and of J_2 at q, and the elbow's least error [m].
 
-    That is the least one to which the arm gets from q while the hand stays where it is.
+    The error is the least one that the arm reaches from q while the hand rests.
     """
     kinematics = Kinematics(arm)
     kinematics.update(q)
@@ -166,7 +166,7 @@ def _conflict(
     left = np.linalg.svd(task.J @ null_space(first.J, 1e-6), compute_uv=False)
     free = float(left[rank - 1]) if len(left) >= rank else 0.0
     apart = float(np.linalg.norm(task.error))
-    for _ in range(SELF_MOTION):
+    for _ in range(SELF_MOTION_STEPS):
         back = np.linalg.pinv(first.J, rcond=1e-6) @ first.error
         N = null_space(first.J, 1e-6)
         pull = task.error - task.J @ back

@@ -1,4 +1,4 @@
-"""A lift with a payload that the joints can hold but not throw."""
+"""A lift of a payload that is faster than the joint torques allow."""
 
 from __future__ import annotations
 
@@ -31,23 +31,23 @@ from dikbench.scenario import (
 class TorqueLimited(Family):
     """A payload that is lifted and lowered faster than the joints' torques allow, and held between.
 
-    Straight up by `height`, orientation fixed, from rest to rest in the way of least jerk; a dwell;
-    down again; a dwell. The payload, a ball of 5 cm radius in the hand, is so heavy that to hold it
-    takes `load` of a joint's effort limit at the worst place on the way (not what the maker rates
-    the arm for); the lift is so fast that the torques of its own joint motion peak at `demand`
-    times the limits, setting off upwards and stopping at the bottom. Effort limits are in force,
-    and torque constraints with them. Friction and the motors' inertia do not count. A seed moves
-    the start by up to 0.05 rad per joint and turns the way up by up to 0.2 rad.
+    Straight up by `height`, orientation fixed, from rest to rest with least jerk; a dwell; down
+    again; a dwell. The payload is a ball of 5 cm radius in the hand; holding it takes `load` of a
+    joint's effort limit at the worst point of the path (not the rated payload of the arm). The
+    torques of the exact joint motion peak at `demand` times the limits, when it starts upwards and
+    stops at the bottom. Effort limits and torque constraints are in force; friction and the motors'
+    inertia are neglected. A seed moves the start by up to 0.05 rad per joint and turns the
+    direction of the lift by up to 0.2 rad.
 
     Provokes: torques beyond the effort limits, at speeds inside the velocity limits
 
     Shows in: torque_usage_max, torque_violating_share, position_error_max_m, infeasible_share
 
     Attributes:
-        height: of the lift.
-        load: largest torque that it takes to hold the payload over the limits.
-        demand: largest torque of the reference's joint motion over the limits.
-        dwell: how long it is held at either end.
+        height: height of the lift.
+        load: largest torque over its limit while the payload is held.
+        demand: largest torque of the exact joint motion over its limit.
+        dwell: duration of the dwell at either end.
 
     Source: least jerk: Flash & Hogan 1985; torques: Featherstone 2008 (recursive Newton-Euler).
     """
@@ -63,7 +63,7 @@ class TorqueLimited(Family):
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """See `Family`."""
         arm = robot.with_limits(effort=robot.available_effort)
-        effort_limits(arm)  # there are some
+        effort_limits(arm)  # raises an error where there are none
         check_can_lift(arm, self.robots)
         q0 = change.posture(arm, arm.q0)
         bottom = placement_of(arm, q0)
@@ -91,27 +91,27 @@ class TorqueLimited(Family):
 
 
 def _gravity(arm: Robot, q: Array) -> Array:
-    """The torques that hold the arm at configurations q (k, nq), (k, nv) [N m]."""
+    """Compute the torques that hold the arm at configurations q (k, nq), (k, nv) [N m]."""
     return np.array([pin.computeGeneralizedGravity(arm.model, arm.scratch, x).copy() for x in q])
 
 
 def _torques(arm: Robot, motion: OracleMotion) -> Array:
-    """The torques of a joint motion at its inner samples, (k - 1, nv) [N m]."""
+    """Compute the torques of a joint motion at its inner samples, (k - 1, nv) [N m]."""
     period, v = float(motion.instants[1] - motion.instants[0]), motion.v
     return TorqueConstraint().torques(arm, motion.q[1:-1], v[1:], v[:-1], period)
 
 
 def _usage(arm: Robot, torques: Array) -> float:
-    """The largest torque over its limit."""
+    """Compute the largest torque over its limit."""
     assert arm.limits.effort is not None
     return float(arm.limits.effort.usage(torques).max())
 
 
 def _heaviest(arm: Robot, q: Array, load: float) -> float:
-    """The mass [kg] in the hand that takes `load` of a joint's limit to hold, at worst along q.
+    """Compute the payload [kg] whose holding torque peaks at `load` of a limit along q.
 
     Raises:
-        DikbenchError: if the arm by itself takes as much.
+        DikbenchError: if the arm without payload needs as much.
     """
     empty = _gravity(arm, q)
     if (used := _usage(arm, empty)) >= load:
@@ -123,16 +123,16 @@ def _heaviest(arm: Robot, q: Array, load: float) -> float:
 
 
 def _shortest(arm: Robot, rise: OracleMotion, demand: float) -> float:
-    """The time [s] in which the torques of a motion done in one second peak at `demand`.
+    """Compute the time [s] in which the torques of a one-second motion peak at `demand`.
 
-    What is not gravity goes with 1/time^2.
+    Torques other than gravity are proportional to 1/time^2.
     """
     holding = _gravity(arm, rise.q[1:-1])
     return 1 / float(np.sqrt(_first_at(arm, demand, holding, _torques(arm, rise) - holding)))
 
 
 def _first_at(arm: Robot, share: float, torques: Array, slope: Array) -> float:
-    """The smallest x at which a joint of torques + x slope, (k, nv), is at `share` of its limit."""
+    """Compute the smallest x at which torques + x slope, (k, nv), reach `share` of a limit."""
     assert arm.limits.effort is not None
     limit = share * arm.limits.effort.upper
     with np.errstate(divide="ignore"):

@@ -26,14 +26,14 @@ from dikbench.scenario import (
     target_at_rest,
 )
 
-STRIDE = 0.02
-"""Step [m] by which the line is followed; halved where it leads too far."""
+FIRST_STEP_M = 0.02
+"""First step along the line, which is halved where it leads too far."""
 
-RESOLUTION = 1e-4
-"""The reach is known to so much [m]."""
+REACH_RESOLUTION_M = 1e-4
+"""Step at which the search for the reach ends."""
 
-FARTHEST_STEP = 0.6
-"""A solution that is further away than this [rad] belongs to another branch."""
+LARGEST_JOINT_STEP_RAD = 0.6
+"""A solution that is farther away belongs to another branch."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,17 +42,17 @@ class WorkspaceBoundary(Family):
 
     On the ray from the first joint's origin o through the start, at the distance r_0:
     p(tau) = o + (r_0 + (extent reach - r_0) sin^2(pi tau/T)) u, or, where the path is `still`, the
-    farthest point from the first instant on, for 20/gain seconds. The reach is that along the ray,
-    measured by following it until no posture does, and ends in a singularity, not at a limit. A
+    farthest point from the first instant on, for 20/gain seconds. The reach is measured by
+    following the ray as far as there are postures, and ends in a singularity, not at a limit. A
     seed moves the start by up to 0.1 rad per joint.
 
-    Provokes: a target that nothing can reach: chatter about a stretched arm, and the way back
+    Provokes: a target out of reach: chatter of a stretched arm, and the way back
 
     Shows in: sigma_min, velocity_peak_ratio, stuck_share
 
     Attributes:
         path: out and back, or at rest at the farthest point.
-        extent: farthest point over the reach along the ray.
+        extent: distance of the farthest point over the reach along the ray.
         speed: peak speed along the line.
 
     Source: Chiaverini, Siciliano & Egeland 1994 (the arm stretched at the boundary).
@@ -83,8 +83,8 @@ class WorkspaceBoundary(Family):
         if self.path == "still":
             reference = target_at_rest(at(farthest), 20 / self.gain)
         else:
-            along, way = start.rotation.T @ ray, farthest - first
-            reference = _out_and_back(at, along, first, way, self.speed)
+            along = start.rotation.T @ ray
+            reference = _out_and_back(at, along, first, farthest - first, self.speed)
         asked = robot.reach_of(reference.placement(reference.duration / 2))
         sigma = motion.sigma_min
         claims = (
@@ -100,15 +100,15 @@ class WorkspaceBoundary(Family):
 def _as_far_as_it_goes(
     arm: Robot, at: Callable[[float], Any], first: float, q0: Array
 ) -> OracleMotion:
-    """The motion along the placements at(distance) from `first` [m] on to the last one reached."""
-    q, distance, stride = [q0], first, STRIDE
-    while stride > RESOLUTION:
+    """Follow the placements at(distance) from `first` [m] on until none is reached."""
+    q, distance, stride = [q0], first, FIRST_STEP_M
+    while stride > REACH_RESOLUTION_M:
         try:
             further = solve_placement(arm, at(distance + stride), q[-1], iterations=30)
         except DikbenchError:
             stride /= 2
             continue
-        if np.abs(pin.difference(arm.model, q[-1], further)).max() > FARTHEST_STEP:
+        if np.abs(pin.difference(arm.model, q[-1], further)).max() > LARGEST_JOINT_STEP_RAD:
             stride /= 2
             continue
         q.append(further)
@@ -117,14 +117,14 @@ def _as_far_as_it_goes(
 
 
 def _out_and_back(
-    at: Callable[[float], Any], direction: Array, first: float, way: float, speed: float
+    at: Callable[[float], Any], direction: Array, first: float, length: float, speed: float
 ) -> Reference:
-    """From the distance `first` [m] along `direction` (in the frame's axes) by `way`, and back."""
-    duration = pi * way / speed
+    """Build the line from the distance `first` [m] along `direction` by `length`, and back."""
+    duration = pi * length / speed
     rate = pi / duration
 
     def velocity(tau: float) -> Array:
-        along = way * rate * np.sin(2 * rate * tau)
+        along = length * rate * np.sin(2 * rate * tau)
         return np.concatenate([along * direction, np.zeros(3)])
 
-    return Reference(duration, lambda tau: at(first + way * np.sin(rate * tau) ** 2), velocity)
+    return Reference(duration, lambda tau: at(first + length * np.sin(rate * tau) ** 2), velocity)

@@ -1,4 +1,4 @@
-"""The command line. Heavy imports stand inside the commands."""
+"""The command line; slow imports are inside the commands."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any
 
 import click
 
+from dikbench.cli.checking import check
 from dikbench.cli.one_line_errors import one_line_errors
 from dikbench.cli.reading_commands import compare, replay
 
@@ -18,7 +19,7 @@ SUBJECTS = ("formulations", "scenarios", "solvers", "robots", "metrics", "studie
 
 
 def main() -> None:
-    """Run the command line; a wrong option is one line as well."""
+    """Run the command line; a wrong option gives one line."""
     try:
         sys.exit(commands.main(prog_name="dikbench", standalone_mode=False))
     except click.exceptions.NoArgsIsHelpError as error:
@@ -37,55 +38,42 @@ def main() -> None:
 def commands() -> None:
     """Compare formulations of differential inverse kinematics in closed loop, on real robot models.
 
-    A selector is a name, with parameters where wanted: 'dls[damping=0.1]',
+    A selector is a name, with parameters if needed: 'dls[damping=0.1]',
     'near-miss[robot=ur5,miss=0.02]', 'osqp[eps_abs=1e-6]'.
     """
 
 
+def _axis(name: str, help: str, **settings: Any) -> Callable[..., Any]:
+    """Make the option that replaces an axis of a study; it may be repeated."""
+    return click.option(f"--{name}", f"{name}s", multiple=True, help=help, **settings)
+
+
 STUDY_OPTIONS = (
     click.argument("study", required=False),
-    click.option(
-        "--formulation",
-        "formulations",
-        multiple=True,
+    _axis(
+        "formulation",
+        "A formulation, path/to/file.py:Class, or oracle; 'dls[damping=0.01|0.1]' is two.",
         metavar="SELECTOR",
-        help="A formulation, path/to/file.py:Class, or oracle; 'dls[damping=0.01|0.1]' is two.",
     ),
-    click.option(
-        "--scenario",
-        "scenarios",
-        multiple=True,
-        metavar="SELECTOR",
-        help="A scenario; repeat for more.",
+    _axis("scenario", "A scenario; repeat for more.", metavar="SELECTOR"),
+    _axis(
+        "solver", "A solver, for formulations that need one; repeat for more.", metavar="SELECTOR"
     ),
-    click.option(
-        "--solver",
-        "solvers",
-        multiple=True,
-        metavar="SELECTOR",
-        help="A solver, for formulations that need one; repeat for more.",
-    ),
-    click.option(
-        "--seed",
-        "seeds",
-        multiple=True,
+    _axis(
+        "seed",
+        "A seed of the scenarios; 0 perturbs nothing; repeat for more.",
         type=click.IntRange(min=0),
         metavar="N",
-        help="A seed of the scenarios; 0 perturbs nothing; repeat for more.",
     ),
-    click.option(
-        "--plant",
-        "plants",
-        multiple=True,
+    _axis(
+        "plant",
+        "ideal or saturating, with noise and delay: 'ideal[noise=1e-4,delay=2]'; repeat.",
         metavar="SELECTOR",
-        help="ideal or saturating, with noise and delay: 'ideal[noise=1e-4,delay=2]'; repeat.",
     ),
-    click.option(
-        "--reference",
-        "references",
-        multiple=True,
+    _axis(
+        "reference",
+        "What advances the reference: the clock, or the progress achieved.",
         type=click.Choice(["time", "path"]),
-        help="What moves the reference on: the clock, or the progress achieved.",
     ),
     click.option(
         "--out",
@@ -95,9 +83,16 @@ STUDY_OPTIONS = (
     ),
 )
 
+JOBS_OPTION = click.option(
+    "--jobs",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Worker processes; default: one per core.",
+)
+
 
 def study_options(command: Callable[..., None]) -> Callable[..., None]:
-    """The options that select a study, its axes and its results folder."""
+    """Add the options that select a study, its axes and its results folder."""
     for option in reversed(STUDY_OPTIONS):
         command = option(command)
     return command
@@ -114,12 +109,7 @@ def _selected(study: str | None, axes: dict[str, Any], out: Path | None) -> tupl
 
 @commands.command()
 @study_options
-@click.option(
-    "--jobs",
-    type=click.IntRange(min=1),
-    metavar="N",
-    help="Worker processes; default: one per core.",
-)
+@JOBS_OPTION
 @click.option(
     "--rerun",
     default="",
@@ -185,7 +175,7 @@ def run(
 @study_options
 @one_line_errors
 def time(study: str | None, out: Path | None, **axes: Any) -> None:
-    """Take the times of a study's cells anew, without its trials; let nothing else run.
+    """Repeat the timing pass of a study, without its trials; run nothing else meanwhile.
 
     STUDY and the options are those of `dikbench run`.
     """
@@ -206,9 +196,9 @@ def time(study: str | None, out: Path | None, **axes: Any) -> None:
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path, file_okay=False))
 @one_line_errors
 def report(folder: Path) -> None:
-    """Remake the tables, figures and report of a results folder, from what is in it.
+    """Write the tables, figures and report of a results folder again, from its contents.
 
-    A committed folder, which has trials.csv and manifest.json but no store, will do.
+    A committed folder with trials.csv and manifest.json but without the store is enough.
     """
     from dikbench.report.write import write_report
 
@@ -217,18 +207,13 @@ def report(folder: Path) -> None:
 
 @commands.command()
 @click.argument("folder", type=click.Path(path_type=Path, file_okay=False))
-@click.option(
-    "--jobs",
-    type=click.IntRange(min=1),
-    metavar="N",
-    help="Worker processes; default: one per core.",
-)
+@JOBS_OPTION
 @one_line_errors
 def recompute(folder: Path, jobs: int | None) -> None:
-    """Compute all metrics of a results folder anew from its traces, without running a formulation.
+    """Compute all metrics of a results folder again from its traces, without running a formulation.
 
-    For metrics that are new, or were mended, since the run. Trials whose trace was not kept stay as
-    they are; the tables and figures are made anew by the next `dikbench run`.
+    For metrics that are new or have changed since the run. Trials without a trace keep their
+    values; `dikbench report` writes the tables and figures again.
     """
     from dikbench.run.pool import available_cores
     from dikbench.run.recompute import recompute_results
@@ -260,7 +245,7 @@ def status(folder: Path) -> None:
 @click.argument("subject", required=False, type=click.Choice(SUBJECTS))
 @one_line_errors
 def list_(subject: str | None) -> None:
-    """List what there is, a line each with its source; all of it without SUBJECT."""
+    """List formulations, scenarios, ..., a line each with its source; default: all subjects."""
     from dikbench.cli.listing import listing
 
     for name in (subject,) if subject else SUBJECTS:
@@ -295,5 +280,6 @@ def show(name: str, figure: Path | None) -> None:
     click.echo(text)
 
 
+commands.add_command(check)
 commands.add_command(compare)
 commands.add_command(replay)

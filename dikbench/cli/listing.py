@@ -1,4 +1,4 @@
-"""What there is, in lines and in full."""
+"""Lists of formulations, families, solvers, robots, metrics and studies, and their descriptions."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from dikbench.study.study import load_study, shipped_studies
 
 
 def listing(subject: str) -> list[str]:
-    """A line for each thing of a kind: name, what it is, source."""
+    """List the things of one kind, a line each: name, what it is, source."""
     return _aligned(_SUBJECTS[subject]())
 
 
@@ -42,13 +42,13 @@ def _aligned(rows: list[tuple[str, str, str]]) -> list[str]:
 
 
 def _bracketed(source: str) -> str:
-    """A source in brackets; the keys of the references page bring their own."""
+    """Put a source in brackets; keys of the references page have theirs already."""
     return f"[{source}]" if source and "[" not in source else source
 
 
 def _formulations() -> list[tuple[str, str, str]]:
     formulations = plugins("formulation").values()
-    summary = "Not a law: the joint motion from which a scenario's path was built, scored like one"
+    summary = "Not a formulation: the exact joint motion of a scenario, scored like one"
     return [
         *(
             (formulation.name, formulation.summary.rstrip("."), formulation.source)
@@ -59,7 +59,7 @@ def _formulations() -> list[tuple[str, str, str]]:
 
 
 def _scenarios() -> list[tuple[str, str, str]]:
-    """What each family provokes and which metrics show it; its summary where it does not say."""
+    """List what each family provokes and which metrics show it; else its summary."""
     return [
         (f.name, f.paragraph("Provokes") or f.summary.rstrip("."), f.paragraph("Shows in"))
         for f in plugins("scenario").values()
@@ -92,7 +92,7 @@ _SUBJECTS: Mapping[str, Callable[[], list[tuple[str, str, str]]]] = {
 
 
 def description(text: str) -> str:
-    """One thing in full.
+    """Describe one thing in full.
 
     Raises:
         DikbenchError: if nothing has this name, or a parameter of it is wrong.
@@ -121,7 +121,7 @@ def description(text: str) -> str:
 
 
 def _plugin(plugin: Plugin, drawn: str) -> str:
-    """A plug-in's docstring and parameters; `drawn` says what their drawn ranges are for."""
+    """Describe a plug-in by its docstring and parameters; `drawn` says what ranges are for."""
     parameters = [
         f"  {p.name}{'' if p.required else f' = {p.default}'}: {p.valid}"
         + (f"  ({drawn}: {p.drawn})" if p.drawn else "")
@@ -141,17 +141,17 @@ def _plugin(plugin: Plugin, drawn: str) -> str:
 
 
 def _difficulty(text: str) -> list[str]:
-    """The certificate of a scenario, and what its own joint motion asks of the robot."""
+    """Describe a scenario's certificate and what its exact joint motion asks of the robot."""
     scenario = make_scenario(text)
     lines = [f"Certificate of {text}:", *(f"  {claim}" for claim in scenario.certificate.claims)]
     motion = scenario.motion
     if motion is None:
-        lines += ["", "No joint motion does what it asks for."]
+        lines += ["", "No joint motion follows its reference."]
     else:
         sigma, margin, reach = motion.sigma_min, motion.margin, motion.reach
         lines += [
             "",
-            f"The joint motion that does it, in {len(motion.instants)} samples "
+            f"The exact joint motion, in {len(motion.instants)} samples "
             f"({scenario.duration:.4g} s, {scenario.steps} control steps):",
             f"  smallest singular value (m, rad): {sigma.min():.4g} to {sigma.max():.4g}",
             f"  margin to the position limits [rad]: {margin.min():.4g} to {margin.max():.4g}",
@@ -168,7 +168,7 @@ def _solver(name: str) -> str:
     return "\n".join(
         [
             f"{name}: {entry.summary}",
-            f"  package: {entry.distribution}, {'installed' if is_installed(name) else 'missing'}",
+            f"  package: {entry.package}, {'installed' if is_installed(name) else 'missing'}",
             f"  interfaces: {', '.join(entry.interfaces)} (the first is the default)",
             f"  linear programs: {entry.no_lp or 'yes'}",
             f"  presets: {presets} (largest residual of a verified answer)",

@@ -1,4 +1,4 @@
-"""Errors of a command: one line, whatever was wrong."""
+"""Errors of a command, in one line."""
 
 from __future__ import annotations
 

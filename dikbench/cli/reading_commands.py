@@ -1,4 +1,4 @@
-"""Commands that read results. Heavy imports stand inside the commands."""
+"""Commands that read results; slow imports are inside the commands."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from dikbench.cli.one_line_errors import one_line_errors
     multiple=True,
     metavar="METRIC=VALUE",
     help="How much worse a metric may become in any trial, in its unit or in percent of its value "
-    "in A ('position_error_rms_m=5%'); repeat. A trial that newly fails is then beyond it as well.",
+    "in A ('position_error_rms_m=5%'); repeat. A trial that newly fails exceeds it as well.",
 )
 @click.option(
     "--out",
@@ -57,13 +57,13 @@ def compare(a: Path, b: Path, tolerances: tuple[str, ...], out: Path | None) -> 
     type=click.FloatRange(min=0, min_open=True),
     default=1.0,
     show_default=True,
-    help="How fast; 0.5 is half as fast as the robot.",
+    help="Speed of the replay over the robot's.",
 )
 @click.option(
     "--html",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE",
-    help="Write the replay as one file for any browser instead of serving it.",
+    help="Write the replay to one HTML file instead of serving it.",
 )
 @one_line_errors
 def replay(trial: str, results: Path | None, speed: float, html: Path | None) -> None:

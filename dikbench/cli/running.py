@@ -1,4 +1,4 @@
-"""Running a study from Python, as `dikbench run` does."""
+"""Running a study from Python, like `dikbench run`."""
 
 from __future__ import annotations
 
@@ -43,18 +43,18 @@ def run_study(
             out="runs/mine",
         )
 
-    Does what `dikbench run` does, with the same defaults; called again, it continues a run that was
-    stopped. Formulations and families of your own are given as `path/to/file.py:Class`, since every
-    trial runs in a process of its own.
+    It has the defaults of `dikbench run`; called again, it continues a run that was stopped. Your
+    own formulations and families are given as `path/to/file.py:Class`, since every trial runs in
+    its own process.
 
     Args:
         study: a shipped study (see `dikbench list studies`) or a TOML file; default: quick.
         formulations: selectors that replace those of the study.
-        scenarios: likewise.
-        solvers: likewise.
-        seeds: of the scenarios, likewise.
-        plants: selectors, likewise.
-        references: `time` or `path`: what moves the reference on.
+        scenarios: the same.
+        solvers: the same.
+        seeds: seeds of the scenarios that replace those of the study.
+        plants: selectors that replace those of the study.
+        references: `time` or `path`: what advances the reference.
         out: results folder; default: runs/STUDY.
         jobs: number of worker processes; default: one per core.
         trial_timeout: wall-clock limit of a trial [s].

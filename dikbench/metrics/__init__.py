@@ -1,7 +1,7 @@
-"""The metrics of a trial, and all that the author of a metric imports.
+"""The metrics of a trial: everything that the author of a metric imports.
 
-A metric is a pure function of the recorded motion, never of what a solver said. Most are taken of a
-series (`series_metrics`): a value per step or instant of a `Motion`, reduced to one number.
+A metric is a pure function of the recorded motion. Most are reductions of a series
+(`series_metrics`), which has a value per step or instant of a `Motion`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A motion along the path of its reference: what it covered, when, and within which tolerance."""
+"""The course of a motion along its path: its coverage, its lag and the tolerances it needs."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from dikbench.scenario.scenario import Scenario
 from dikbench.simulation.trace import Trace
 
 LAG_ALLOWED_S: Final = 0.1
-"""A motion is on time if it is at most so late at the end of its reference [s] ..."""
+"""Lag [s] at the end of the reference up to which a motion is in time ..."""
 
 LAG_ALLOWED_SHARE: Final = 0.05
-"""... or by at most this share of the reference's nominal duration."""
+"""... or up to this share of the nominal duration of the reference, where that is more."""
 
 DONE_SHARES: Final = (0.99, 0.90)
-"""Shares of the path of which it is asked at which tolerance they are covered."""
+"""Shares of the path for which the tolerances are computed at which they are covered."""
 
 ROUNDING: Final = 1e-9
-"""Of path lengths [m] and nominal times [s] that are compared."""
+"""Tolerance of comparisons of path lengths [m] and of nominal times [s]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Off the path in position alone, wherever the target is."""
+"""Distance from the path in position alone, wherever the target is."""
 
 from __future__ import annotations
 

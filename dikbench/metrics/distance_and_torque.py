@@ -1,4 +1,4 @@
-"""How near the motion came to obstacles and to itself, and what its torques were."""
+"""Distances from obstacles and between links, and joint torques."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from dikbench.metrics.metric import series_metrics
 
 RELATIVE_TORQUE_TOLERANCE: Final = 1e-6
-"""A torque beyond its limit by less than this share of it is a solver's tolerance."""
+"""Share of a limit by which a torque may exceed it, which is a solver's tolerance."""
 
 CONSTRAINTS = (
     *series_metrics(

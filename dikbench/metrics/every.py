@@ -1,4 +1,4 @@
-"""Every metric, and a motion by all of them."""
+"""All metrics, and their values for a motion."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ METRICS: Mapping[str, Metric] = MappingProxyType(
 def evaluate(motion: Motion) -> dict[str, float]:
     """Compute every metric of a motion, by name.
 
-    A motion that is not finite came to nothing: each metric has its worst value.
+    For a motion that is not finite each metric has its worst value.
     """
     trace = motion.trace
     recorded = (trace.q, trace.tau, trace.wanted, trace.applied)

@@ -1,4 +1,4 @@
-"""What a metric is, and how the metrics of one series are made."""
+"""Metrics, and the metrics of one series."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ Better = Literal["low", "high"]
 
 @dataclass(frozen=True)
 class Metric:
-    """A number that says how a trial went.
+    """A number that measures a trial.
 
     Attributes:
-        name: its column, with the unit at the end (see `unit_suffix`).
+        name: name of its column, with the unit at the end (see `unit_suffix`).
         unit: empty for a share, a ratio or a number of steps.
         best: which direction is better.
-        worst: the value of a trial that came to nothing.
-        definition: what it is, in one line.
+        worst: the value of a failed trial.
+        definition: the definition in one line.
         of: computes it; NaN where the motion does not define it.
-        source: the paper that it is from, by its key in `formulations/REFERENCES.md`.
+        source: key of its paper in `formulations/REFERENCES.md`.
     """
 
     name: str
@@ -51,15 +51,14 @@ def series_metrics(
     """Make the metrics of one series: a value per step, or at the start and after each step.
 
     Args:
-        name: how their names begin; the reduction and the unit follow.
-        unit: of the values; a share and a number of steps have none.
-        definition: of the values, such as follows "largest", or "share of the steps".
-        values: computes them from a motion, (k,); a mask for a share or a number of steps.
-        reductions: what is taken of them, names of `REDUCTIONS`, in the order of the columns.
+        name: beginning of their names; the reduction and the unit follow.
+        unit: unit of the values; a share and a number of steps have none.
+        definition: definition of the values, phrased to follow "largest" or "share of the steps".
+        values: computes the values of a motion, (k,); a mask for a share or a number of steps.
+        reductions: names of `REDUCTIONS`, in the order of the columns.
         best: which direction is better.
-        worst: the value of a trial that came to nothing; without one it is 0 or 1 for a share, and
-            infinite otherwise.
-        source: the paper that they are from.
+        worst: the value of a failed trial; default: 0 or 1 for a share, else infinite.
+        source: key of their paper.
     """
 
     def metric(reduction: str) -> Metric:
@@ -80,5 +79,5 @@ def series_metrics(
 
 
 def unit_suffix(unit: str) -> str:
-    """How a unit is written at the end of a column's name: rad/s^2 is rad_s2, 1/s is per_s."""
+    """Write a unit as the end of a column's name: rad/s^2 is rad_s2, 1/s is per_s."""
     return unit.replace("1/", "per_").replace("/", "_").replace(" ", "_").replace("^", "")

@@ -9,7 +9,6 @@ import numpy as np
 
 from dikbench.arrays import Array, Indices
 from dikbench.metrics.along_path import AlongPath
-from dikbench.metrics.singular_values import smallest_of_all_singular_values
 from dikbench.problem.constraints import CollisionConstraint, TorqueConstraint
 from dikbench.problem.progress import progress, row_weights
 from dikbench.problem.tasks import PostureTask
@@ -22,7 +21,7 @@ from dikbench.simulation.trace import Trace
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A trace of n control steps, and what follows from it; computed when it is first asked for.
+    """A trace of n control steps and quantities derived from it, computed on first use.
 
     Attributes:
         trace: the trace.
@@ -93,8 +92,8 @@ class Motion:
     def contour_error(self) -> Array:
         """Distance of the task frame from the path of the reference, (n + 1,) [m].
 
-        The nearest point of the whole path counts, whenever the reference is there. Of a target
-        without a path it is the distance from the target. NaN where the task is about the
+        The nearest point of the whole path counts, whatever its nominal time. Without a path it is
+        the distance from the target. NaN where the task is about the
         orientation only.
         """
         path = self.scenario.path
@@ -163,7 +162,7 @@ class Motion:
     def second_task_error(self) -> Array:
         """Norm of the errors of the second tasks, (n + 1,) [their units]; empty without any.
 
-        Postures do not count: they only choose among the postures that a redundant arm has.
+        Posture tasks do not count, since they only use the redundancy of the arm.
         """
         second = [task for task in self.scenario.tasks if not isinstance(task, PostureTask)]
         if not second:
@@ -213,7 +212,7 @@ class Motion:
     @cached_property
     def sigma_min(self) -> float:
         """Smallest singular value of the task Jacobian (m, rad) during the motion."""
-        return smallest_of_all_singular_values(self.jacobians)
+        return float(np.linalg.svd(self.jacobians, compute_uv=False)[:, -1].min())
 
     @cached_property
     def _distances(self) -> list[Array]:

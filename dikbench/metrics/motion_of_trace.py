@@ -1,4 +1,4 @@
-"""The motion behind a trace: poses, errors and Jacobians of the recorded configurations."""
+"""The motion of a trace: poses, errors and Jacobians of the recorded configurations."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ def motion_of(trace: Trace, scenario: Scenario, jacobians: Array | None = None) 
     """Compute the motion of the task frame from the recorded configurations and velocities.
 
     Args:
-        trace: what was recorded.
-        scenario: the case that it is a trace of.
-        jacobians: the task Jacobians at its configurations but the last, (n, m, nv), where the run
-            has computed them; they would come out the same.
+        trace: the record.
+        scenario: the case of the trace.
+        jacobians: the task Jacobians at all configurations but the last, (n, m, nv), if the run has
+            computed them; otherwise they are computed, with the same result.
     """
     robot, frame = scenario.robot, scenario.robot.frame_id
     n, rows = trace.steps, np.array(scenario.rows)

@@ -1,4 +1,4 @@
-"""Whether the joints return with the task frame: drift in the null space over laps of a path."""
+"""Drift in the null space over laps of a path: whether the joints return with the frame."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from dikbench.metrics.metric import INF, Metric
 from dikbench.metrics.motion import Motion
 
 PHASES_PER_LAP: Final = 8
-"""Configurations are compared at this many phases of a lap."""
+"""Number of phases of a lap at which configurations are compared."""
 
 
 def null_space_drift(motion: Motion) -> float:
@@ -23,8 +23,7 @@ def null_space_drift(motion: Motion) -> float:
 
     as long as tau + P is reached, with P the period of the reference and t_0 the beginning of its
     first lap; of the joints that move the task frame, interpolated between control steps. NaN where
-    the reference has no laps, the run does not complete one, or the task leaves the joints no
-    choice.
+    the reference has no laps, the run does not complete one, or the task has no null space.
     """
     reference, robot = motion.scenario.reference, motion.scenario.robot
     tau, period = motion.trace.tau, reference.period

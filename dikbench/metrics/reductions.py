@@ -14,11 +14,11 @@ from dikbench.arrays import Array, Mask
 
 @dataclass(frozen=True)
 class Reduction:
-    """A way from a series to a number.
+    """A reduction of a series to a number.
 
     Attributes:
-        wording: how a definition says it, with {} for the definition of the series.
-        of: computes it of values, or of a mask, (k,).
+        wording: its wording in definitions, with {} for the definition of the series.
+        of: computes it from values or a mask, (k,).
     """
 
     wording: str
@@ -26,7 +26,7 @@ class Reduction:
 
 
 def rms(values: Array) -> float:
-    """Compute the root mean square; NaN of nothing."""
+    """Compute the root mean square; NaN without values."""
     return float(np.sqrt(np.mean(np.square(values)))) if len(values) else float("nan")
 
 
@@ -45,7 +45,7 @@ def percentile_95(values: Array) -> float:
     """Compute the 95 % quantile, linear between two of the values; NaN of nothing."""
     if not len(values):
         return float("nan")
-    ordered = np.sort(values)  # np.percentile costs ten times as much
+    ordered = np.sort(values)  # np.percentile takes ten times as long
     place = 0.95 * (len(values) - 1)
     below = ordered[int(place)]
     above = ordered[min(int(place) + 1, len(values) - 1)]
@@ -79,4 +79,4 @@ REDUCTIONS: Mapping[str, Reduction] = MappingProxyType(
         "steps": Reduction("number of steps {}", number_set),
     }
 )
-"""What can be taken of a series, by the word for it in the names of columns."""
+"""The reductions by their names in columns."""

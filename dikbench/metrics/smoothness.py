@@ -12,16 +12,16 @@ from dikbench.metrics.motion import Motion
 from dikbench.metrics.sparc import sparc
 
 ACCELERATION_DEAD_BAND_RAD_S2: Final = 0.1
-"""An acceleration below this has no sign: rounding is no reversal."""
+"""Smaller accelerations have no sign, so that rounding is not a reversal."""
 
 CHATTER_FREQUENCY_HZ: Final = 10.0
-"""Above this frequency no scenario asks for motion."""
+"""Frequency above which no scenario has desired motion."""
 
 MIN_PERIODS: Final = 2
-"""The spectrum of a run is only looked at if it is this many periods of the frequency long."""
+"""Smallest length of a run in periods of the frequency for a spectrum."""
 
 NEGLIGIBLE_SPEED_RAD_S: Final = 1e-4
-"""A motion whose joint velocities vary by less than this is steady."""
+"""Variation of joint velocities below which a motion is steady."""
 
 
 def jerk_rms_scaled(motion: Motion) -> float:
@@ -86,7 +86,7 @@ def energy_above(motion: Motion, frequency: float = CHATTER_FREQUENCY_HZ) -> flo
 
 
 def _detrended(v: Array) -> Array:
-    """Subtract their straight lines of least squares from the columns of v (n, nv)."""
+    """Subtract the least-squares straight line from each column of v (n, nv)."""
     t = np.arange(len(v)) - (len(v) - 1) / 2
     varying: Array = v - v.mean(axis=0)
     varying -= np.outer(t, (t @ varying) / (t @ t))

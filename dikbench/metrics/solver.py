@@ -1,4 +1,4 @@
-"""Whether the formulation had an answer, and whether the solver's answers are right."""
+"""Whether the formulation had answers, and whether the solver's answers are correct."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from dikbench.simulation.status import STEP_CODE, Status
 from dikbench.simulation.trace import Trace
 
 FALLBACK_STATUSES = (Status.INFEASIBLE, Status.SOLVER_FAILED)
-"""Of the steps at which the formulation had no answer and the fallback was applied."""
+"""Statuses of steps without an answer, at which the fallback was applied."""
 
 
 def _has_status(motion: Motion, *statuses: Status) -> Mask:
@@ -30,7 +30,7 @@ def _share(name: str, status: Status, definition: str) -> tuple[Metric, ...]:
 
 
 def _solved(values: Callable[[Trace], Array | Mask]) -> Callable[[Motion], Array | Mask]:
-    """Take values of the steps at which something was solved, and of no other."""
+    """Restrict values to the steps at which something was solved."""
     return lambda motion: values(motion.trace)[motion.trace.claimed >= 0]
 
 

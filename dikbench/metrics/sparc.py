@@ -1,4 +1,4 @@
-"""Spectral arc length, a smoothness of human movements: what is above 10 Hz does not count."""
+"""Spectral arc length, a smoothness of human movements below 10 Hz."""
 
 from __future__ import annotations
 

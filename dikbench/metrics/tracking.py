@@ -1,4 +1,4 @@
-"""How far the task frame is from its target, and how it gets there."""
+"""Tracking errors, progress and direction errors of the task frame."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from dikbench.metrics.motion import Motion
 from dikbench.problem.progress import STUCK_PROGRESS, off_course, row_weights
 
 RECOVERED_POSITION_ERROR_M: Final = 1e-3
-"""Below this position error a frame is back at its target."""
+"""Position error below which a frame has recovered."""
 
 
 def direction_error(motion: Motion) -> Array:

@@ -1,4 +1,4 @@
-"""How far, how often and how long the integrated motion is outside the limits in force."""
+"""Violations of the limits in force by the integrated motion: size, frequency, duration."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from dikbench.metrics.metric import INF, Metric, series_metrics, unit_suffix
 from dikbench.metrics.motion import Motion
 
 VIOLATION_TOLERANCE: Final = 1e-4
-"""A step that passes a limit by less than this [rad, rad/s] is not counted as a violation: that is
-a solver's tolerance, and the largest violation has a column of its own."""
+"""Excess over a limit [rad, rad/s] up to which a step does not count as a violation, which is a
+solver's tolerance; the largest violation has its own column."""
 
 
 def _velocity_usage(motion: Motion) -> float:

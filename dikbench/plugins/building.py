@@ -1,4 +1,4 @@
-"""Selectors turned into objects: texts into typed values, values into a plug-in."""
+"""Objects built from selectors: texts become typed values, values a plug-in."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from dikbench.errors import DikbenchError, unknown
 from dikbench.parameters import Parameter, check_parameters, parameters_of
 from dikbench.plugins.finding import formulation_plugin, scenario_plugin
 from dikbench.problem.problem import Formulation
+from dikbench.scenario.certificate import CertificateFailed
 from dikbench.scenario.family import Family
 from dikbench.scenario.plant import PLANTS, Plant
 from dikbench.scenario.scenario import Scenario
@@ -47,15 +48,17 @@ def make_family(text: str | Selector) -> Family:
 
 
 def make_scenario(text: str | Selector, seed: int = 0) -> Scenario:
-    """Build the scenario of a selector and a seed; its certificate is asserted.
+    """Build the scenario of a selector and a seed, and check its certificate.
 
     Raises:
-        DikbenchError: on an unknown family or parameter, a value out of range, or a certificate
-            that does not hold.
+        DikbenchError: on an unknown family or parameter, or a value out of range.
+        CertificateFailed: if a claim of its certificate does not hold.
     """
     family = make_family(text)
     try:
         return family.scenario(seed)
+    except CertificateFailed as error:
+        raise CertificateFailed(str(text), error.failures) from None
     except MemoryError:
         raise
     except Exception as error:
@@ -76,7 +79,7 @@ def make_plant(text: str | Selector) -> Plant:
 
 
 def scenario_parameters(text: str | Selector) -> Mapping[str, Any]:
-    """The parameters of a scenario's selector with their values, defaults among them.
+    """Return the parameters of a scenario's selector with their values, defaults included.
 
     Raises:
         DikbenchError: on an unknown family or parameter, or a value of the wrong type or out of
@@ -91,8 +94,8 @@ def in_declared_order(
 ) -> Selector:
     """Parse a selector and put its parameters in the order in which its class declares them.
 
-    What is written in another order is then the same text. A selector that names nothing valid
-    stays as it is: who builds from it says why.
+    Selectors that differ in the order only become the same text. A selector that names nothing
+    valid is returned unchanged; building from it gives the error.
 
     Raises:
         DikbenchError: if the text is no selector.
@@ -113,7 +116,7 @@ def _built(
     parameters: Mapping[str, Parameter],
     selector: Selector,
 ) -> Made:
-    """Make an object with the selector's parameters and check them, also where it does not."""
+    """Make an object with the selector's parameters and check them, even if its class does not."""
     values = _values(what, parameters, selector)
     for name, parameter in parameters.items():
         if parameter.required and name not in values:
@@ -138,14 +141,14 @@ def _values(what: str, parameters: Mapping[str, Parameter], selector: Selector) 
             raise unknown(f"parameter of {what}", name, offered)
         try:
             values[name] = msgspec.convert(text, parameter.type, strict=False)
-        except (msgspec.ValidationError, TypeError) as error:  # a TypeError: no text can give it
+        except (msgspec.ValidationError, TypeError) as error:  # a TypeError: no text converts to it
             valid = f"valid: {parameter.valid}" if parameter.choices else str(error)
             raise DikbenchError(f"{what}: {name}={text!r} is not valid: {valid}") from None
     return values
 
 
 def _reason(error: Exception) -> str:
-    """Say an error in one line; of one that is not ours, its type as well."""
+    """Write an error in one line, with its type unless it is a `DikbenchError`."""
     if isinstance(error, DikbenchError):
         return str(error)
     return f"{type(error).__name__}: {error}".partition("\n")[0]

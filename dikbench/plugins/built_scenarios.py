@@ -15,8 +15,8 @@ from dikbench.selector import Selector, parse_selector
 def built(selector: str | Selector, seed: int) -> Scenario | str:
     """Build a scenario of some results, or say why it cannot be built here.
 
-    They may come from another installation. A family that is given as a file is not executed:
-    results are data, and remaking their report must not run what they name.
+    Results may be from another installation. A family in a file is not executed, since remaking a
+    report must not run code that its data names.
     """
     if in_file(parse_selector(selector).name):
         return f"scenario {selector} is code in a file, which a report does not run"

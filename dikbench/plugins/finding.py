@@ -1,8 +1,8 @@
 """Formulations and scenario families, found through entry points or in a file.
 
 An entry point in the group `dikbench.formulations` or `dikbench.scenarios` names a module that
-holds a table `FORMULATIONS` or `SCENARIOS`: name -> class, an instance of one (its values are the
-defaults then), or a `functools.partial` of one.
+has a table `FORMULATIONS` or `SCENARIOS`: name -> class, an instance of a class (whose values
+are then the defaults), or a `functools.partial` of one.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ class Plugin:
 
     Attributes:
         name: the name in the table.
-        factory: the class, which carries the docstring and declares the parameters.
-        file: the file that it comes from.
-        defaults: values that stand in for the defaults of the class.
+        factory: the class with the docstring and the parameters.
+        file: the file of the class.
+        defaults: values that replace the defaults of the class.
     """
 
     name: str
@@ -53,7 +53,7 @@ class Plugin:
         return self.paragraph("Source")
 
     def paragraph(self, title: str) -> str:
-        """The paragraph `title: ...` of its docstring, on one line; empty where there is none."""
+        """Return the paragraph `title: ...` of its docstring on one line, or an empty text."""
         _, _, text = (inspect.getdoc(self.factory) or "").partition(f"{title}: ")
         return " ".join(text.partition("\n\n")[0].split()).rstrip(".")
 
@@ -72,7 +72,7 @@ def plugins(kind: Kind) -> Mapping[str, Plugin]:
 
     Raises:
         DikbenchError: if there is none (dikbench is not installed), a module has no table, an entry
-            is no plug-in, or two share a name.
+            is not a plug-in, or two have the same name.
     """
     group = f"dikbench.{kind}s"
     found: dict[str, Plugin] = {}
@@ -113,12 +113,12 @@ def scenario_plugin(name: str) -> Plugin:
 
 
 def in_file(name: str) -> bool:
-    """Whether a selector's name is `path/to/file.py:Class`."""
+    """Say whether a selector's name has the form `path/to/file.py:Class`."""
     return name.rpartition(":")[0].endswith(".py")
 
 
 def kind_in_file(name: str) -> Kind:
-    """Whether a class that is given as `path/to/file.py:Class` is a formulation or a family."""
+    """Say whether a class in a user's file is a formulation or a family."""
     path, _, class_name = name.rpartition(":")
     found = _class_from_file("formulation", path, class_name)
     return "scenario" if issubclass(found, Family) else "formulation"
@@ -135,7 +135,7 @@ def _plugin(kind: Kind, name: str) -> Plugin:
 
 
 def _registered(kind: Kind, name: object, entry: Any, file: str) -> Plugin:
-    """Check an entry of a table, or a class of a file, and take it apart."""
+    """Check an entry of a table, or a class of a file, and describe it as a plug-in."""
     if not isinstance(name, str) or not name or set(name) & set("[],= \t\n"):
         raise DikbenchError(f"{file}: {name!r} is not a name (no brackets, commas or spaces)")
     factory, defaults = entry, {}
@@ -165,7 +165,7 @@ def _registered(kind: Kind, name: object, entry: Any, file: str) -> Plugin:
 
 
 def _class_from_file(kind: Kind, path: str, class_name: str) -> type:
-    """Take a class out of a file that the user named on the command line."""
+    """Import a class from a file that the user named."""
     module = _module_from_file(kind, path)
     found = getattr(module, class_name, None)
     if not isinstance(found, type):
@@ -184,7 +184,7 @@ def _module_from_file(kind: Kind, path: str) -> ModuleType:
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # dataclasses and pickle look it up there
+    sys.modules[spec.name] = module  # where dataclasses and pickle look it up
     try:
         spec.loader.exec_module(module)
     except Exception as error:

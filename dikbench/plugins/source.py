@@ -1,4 +1,4 @@
-"""The source that a plug-in is made of: its own file, and what it shares with others."""
+"""The source of a plug-in: its own file and the modules that it imports from its package."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from typing import Final
 
 from dikbench.plugins.finding import Plugin
 
-SHARING: Final = ("formulations", "scenarios")
-"""Packages whose modules count wherever they are imported; those of a plug-in's own package do too.
-The harness does not: it is in the version."""
+SHARED_PACKAGES: Final = ("formulations", "scenarios")
+"""Packages whose modules belong to the source of a plug-in that imports them, like those of its own
+package. The harness does not, since its version is recorded."""
 
 
 def source_digest(plugin: Plugin) -> str:
-    """A hash of the source of a plug-in, 16 hexadecimal digits.
+    """Hash the source of a plug-in to 16 hexadecimal digits.
 
-    Of its own file and of the modules of its package that it imports, directly or through others:
-    laws that share a module change with it, and no other law does.
+    The source is its own file and the modules of its package that it imports, directly or
+    indirectly: plug-ins that share a module change with it, and no others do.
     """
     module = plugin.factory.__module__
-    packages = frozenset({*SHARING, module.partition(".")[0]})
+    packages = frozenset({*SHARED_PACKAGES, module.partition(".")[0]})
     files: dict[str, str] = {module: plugin.file}
     waiting = [module]
     while waiting:
@@ -37,7 +37,7 @@ def source_digest(plugin: Plugin) -> str:
 
 @lru_cache(maxsize=256)
 def digest_of_file(file: str) -> str:
-    """A hash of what a file holds; empty where there is none (a class made at a prompt)."""
+    """Hash a file's contents; empty where there is no file (a class made at a prompt)."""
     try:
         return digest(Path(file).read_bytes().decode(errors="replace"))
     except OSError:
@@ -45,16 +45,16 @@ def digest_of_file(file: str) -> str:
 
 
 def digest(text: str) -> str:
-    """A hash of a text, 16 hexadecimal digits."""
+    """Hash a text to 16 hexadecimal digits."""
     return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
 
 
 @lru_cache(maxsize=1024)
 def _imported(file: str, module: str, packages: frozenset[str]) -> frozenset[str]:
-    """The modules of some packages that a file imports, wherever in it, as the module `module`."""
+    """Find the modules of some packages that a file imports anywhere as module `module`."""
     try:
         tree = ast.parse(Path(file).read_bytes())
-    except (OSError, SyntaxError, ValueError):  # no file, or none of Python's
+    except (OSError, SyntaxError, ValueError):  # no file, or not one of Python
         return frozenset()
     found: set[str] = set()
     for node in ast.walk(tree):
@@ -65,14 +65,14 @@ def _imported(file: str, module: str, packages: frozenset[str]) -> frozenset[str
         else:
             continue
         for base, name in names:
-            if base.partition(".")[0] in packages:  # others are not looked for: that imports them
+            if base.partition(".")[0] in packages:  # looking for others would import them
                 inner = f"{base}.{name}"
                 found.add(inner if name and _file(inner) else base)
     return frozenset(found)
 
 
 def _base(node: ast.ImportFrom, file: str, module: str) -> str:
-    """The module from which an import takes names, without the dots of a relative one."""
+    """Return the absolute name of the module from which an import takes names."""
     if not node.level:
         return node.module or ""
     parts = module.split(".")
@@ -83,12 +83,12 @@ def _base(node: ast.ImportFrom, file: str, module: str) -> str:
 
 @lru_cache(maxsize=1024)
 def _file(module: str) -> str:
-    """The file of a module; empty where it has none or is none."""
+    """Return the file of a module; empty where it has none or is no module."""
     loaded = sys.modules.get(module)
     if loaded is not None:
         return getattr(loaded, "__file__", None) or ""
     try:
         spec = importlib.util.find_spec(module)
-    except (ImportError, AttributeError, ValueError):  # its parent is no package
+    except (ImportError, AttributeError, ValueError):  # its parent is not a package
         return ""
     return (spec.origin or "") if spec is not None and spec.has_location else ""

@@ -1,4 +1,4 @@
-"""One control step, and all that the author of a formulation imports.
+"""One control step: everything that the author of a formulation imports.
 
 The problem and its parts (tasks, limits, the velocity box, rows G v <= h), the programs that a
 solver is handed, and linear algebra.

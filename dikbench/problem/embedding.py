@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from dikbench.arrays import Array
-from dikbench.problem.progress import CHARACTERISTIC_LENGTH
+from dikbench.problem.progress import CHARACTERISTIC_LENGTH_M
 from dikbench.problem.tasks import OrientationTask, PoseTask, PositionTask, TrackingTask
 from dikbench.robots.robot import Robot
 
@@ -60,7 +60,7 @@ class Embedding:
 
 
 def embedding_of(
-    task: TrackingTask, robot: Robot, start: Any, length: float = CHARACTERISTIC_LENGTH
+    task: TrackingTask, robot: Robot, start: Any, length: float = CHARACTERISTIC_LENGTH_M
 ) -> Embedding:
     """Make the embedding of what a task on a frame asks for.
 

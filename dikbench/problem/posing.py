@@ -1,4 +1,4 @@
-"""Posing: the one place where the harness makes a `DikProblem`."""
+"""Posing: the only place where the harness makes a `DikProblem`."""
 
 from __future__ import annotations
 
@@ -25,14 +25,16 @@ def pose_problem(
         kinematics: the robot at the configuration q at which everything is linearised.
         v_prev: the velocity that the plant applied last, (nv,) [rad/s or m/s], or None.
         dt: control period [s].
-        tracking: the task J v = V of the end-effector frame; first among its priority.
+        tracking: the task J v = V of the end-effector frame, the first of its priority.
         tasks: the other tasks, in any order (see `DikProblem`).
-        constraints: what must hold in addition to the limits of the joints.
+        constraints: conditions in addition to the joint limits.
 
     Raises:
         DikbenchError: if a task or a constraint does not fit the robot.
     """
     robot, q = kinematics.robot, kinematics.q
-    linearized = [tracking, *[task.linearize(kinematics) for task in tasks]]
+    linearized = [tracking]
+    for task in tasks:
+        linearized.append(task.linearize(kinematics))
     G, h = linearize_all(constraints, kinematics, v_prev, dt)
-    return DikProblem(robot, q, v_prev, dt, linearized, robot.limits.at(q), G=G, h=h)
+    return DikProblem(robot, q, v_prev, dt, linearized, robot.limits.at(q), 0, G, h)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import groupby, pairwise
 from operator import attrgetter
 from typing import Final, Literal, Protocol, runtime_checkable
 
@@ -22,23 +23,21 @@ _PRIORITY: Final = attrgetter("priority")
 
 
 class DikProblem(msgspec.Struct, eq=False):
-    """One control step: where the robot is, what is wanted of it, what it may do.
+    """One control step: the configuration, the tasks, the limits.
 
     The tasks may be given in any order: they are sorted by priority when the problem is made, and
     those of one priority keep the order in which they were given.
 
     Attributes:
-        robot: the robot; `robot.scratch` is free for a formulation's own kinematics.
+        robot: the robot; a formulation may use `robot.scratch` for its own kinematics.
         q: configuration, (nq,).
         v_prev: the velocity that the plant applied last, (nv,); None: no acceleration bound.
         dt: control period [s].
         tasks: the linearised tasks J v = V, most important first, as a tuple.
         limits: the limits in force, as seen from q.
         relaxed: joints whose acceleration bound `box` had to give up (a record, see `box`).
-        G, h: what else must hold, G v <= h, (p, nv) and (p,); None where nothing else must (see
+        G, h: constraints G v <= h in addition, (p, nv) and (p,); None without any (see
             `dikbench.problem.constraints`).
-        levels: one task per priority, most important first, equal priorities stacked. Computed from
-            the tasks when the problem is made, never given.
     """
 
     robot: Robot
@@ -50,18 +49,23 @@ class DikProblem(msgspec.Struct, eq=False):
     relaxed: int = 0
     G: Array | None = None
     h: Array | None = None
-    levels: Sequence[LinearizedTask] = ()
+    _levels: tuple[LinearizedTask, ...] | None = None
 
     def __post_init__(self) -> None:
-        """Sort the tasks and stack those of one priority."""
-        self.tasks = tuple(sorted(self.tasks, key=_PRIORITY))
-        levels: list[list[LinearizedTask]] = []
-        for task in self.tasks:
-            if levels and levels[-1][0].priority == task.priority:
-                levels[-1].append(task)
-            else:
-                levels.append([task])
-        self.levels = tuple([stacked(level) for level in levels])
+        """Sort the tasks. Most are sorted already, one per priority: then they are the levels."""
+        self.tasks = self._levels = tasks = tuple(self.tasks)
+        for first, second in pairwise(tasks):
+            if first.priority >= second.priority:
+                self.tasks, self._levels = tuple(sorted(tasks, key=_PRIORITY)), None
+                break
+
+    @property
+    def levels(self) -> tuple[LinearizedTask, ...]:
+        """One task per priority, most important first, equal priorities stacked: computed once."""
+        if self._levels is None:
+            groups = groupby(self.tasks, _PRIORITY)
+            self._levels = tuple([stacked([*group]) for _, group in groups])
+        return self._levels
 
     @property
     def primary(self) -> LinearizedTask:
@@ -69,50 +73,50 @@ class DikProblem(msgspec.Struct, eq=False):
         return self.levels[0]
 
     def box(self, braking: Braking = "viable", position_gain: float = 0.5) -> Box:
-        """The velocity box (see `velocity_box`); how many bounds it gave up is recorded here."""
+        """Compute the velocity box (see `velocity_box`) and record how many bounds it gave up."""
         box = velocity_box(self.limits, self.v_prev, self.dt, braking, position_gain)
         self.relaxed = box.relaxed
         return box
 
 
 class Solve(Protocol):
-    """A solver, handed to a formulation: timed, counted, its answers rechecked."""
+    """The solver of a formulation: timed, counted, its answers rechecked."""
 
     def __call__(self, program: QuadraticProgram | ModelledProgram) -> Array:
         """Solve a program and return x.
 
         Raises:
             Infeasible: the program has no feasible point.
-            SolverFailed: the solver gave no answer although there is one.
+            SolverFailed: the solver gave no answer to a feasible program.
         """
         ...
 
 
 @runtime_checkable
 class Formulation(Protocol):
-    """A law of differential inverse kinematics: a frozen dataclass whose fields are parameters.
+    """A formulation of differential inverse kinematics: a frozen dataclass of parameters.
 
-    In addition to `velocity` it may declare, as class attributes or properties, `program` (what it
-    needs a solver for; default: none) and `keeps` (the limits it promises to keep; default: none);
-    a paragraph `Source: ...` in its docstring names the paper. The same problem gives the same
-    velocity.
+    In addition to `velocity` it may declare, as class attributes or properties, `program` (the kind
+    of program it has solved; default: none) and `keeps` (the limits it promises to keep; default:
+    none); a paragraph `Source: ...` in its docstring names the paper. The same problem gives the
+    same velocity.
     """
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
-        """The joint velocity of this control step, (nv,) [rad/s or m/s].
+        """Compute the joint velocity of this control step, (nv,) [rad/s or m/s].
 
         Raises:
-            CannotAnswer: as `Infeasible` or `SolverFailed`; the harness applies the fallback.
+            CannotAnswer: `Infeasible` or `SolverFailed`; the harness then applies the fallback.
         """
         ...
 
 
 def program_of(formulation: Formulation) -> ProgramKind | None:
-    """What the formulation needs a solver for; None where it needs none."""
+    """Return the kind of program that the formulation has a solver solve, or None."""
     program: ProgramKind | None = getattr(formulation, "program", None)
     return program
 
 
 def promises_of(formulation: Formulation) -> frozenset[LimitKind]:
-    """The kinds of limits that the formulation promises to keep."""
+    """Return the kinds of limits that the formulation promises to keep."""
     return frozenset(getattr(formulation, "keeps", ()))

@@ -1,1 +1,1 @@
-"""What is solved: quadratic programs, programs in cvxpy's words, and the answer to one."""
+"""Quadratic programs, programs written in cvxpy, and the answer to one."""

@@ -1,4 +1,4 @@
-"""What a back end returned, before anybody believed it."""
+"""The answer of a back end, not yet rechecked."""
 
 from __future__ import annotations
 

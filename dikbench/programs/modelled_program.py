@@ -1,4 +1,4 @@
-"""A program written in cvxpy's modelling words."""
+"""A program written in cvxpy's modelling language."""
 
 from __future__ import annotations
 

@@ -9,16 +9,16 @@ import msgspec
 from dikbench.arrays import Array
 
 ProgramKind = Literal["qp", "lp", "cvxpy"]
-"""What a law hands to its solver: a strictly convex quadratic program, one that may be linear, or
-one written in cvxpy's modelling words."""
+"""What a formulation has solved: a strictly convex quadratic program, one that may be linear, or
+one written in cvxpy's modelling language."""
 
 
 class QuadraticProgram(msgspec.Struct, eq=False):
-    """The program in x.
+    """A quadratic program in x, or a linear one where P = 0.
 
         min 1/2 x^T P x + q^T x   s.t.   G x <= h,   A x = b,   lb <= x <= ub
 
-    with parts named as the library qpsolvers names them. P = 0 makes it a linear program.
+    Its parts have the names that the library qpsolvers gives them.
 
     Attributes:
         P: (n, n), symmetric positive semidefinite.

@@ -1,1 +1,1 @@
-"""Data at rest: the store of a run, its exports, and their one reader."""
+"""Stored results: the store of a run, its exports, and their reader."""

@@ -7,33 +7,27 @@ from types import MappingProxyType
 from typing import Final
 
 TRIAL: Final = ["formulation", "solver", "scenario", "plant", "reference", "seed"]
-"""What says which trial a row is of, whatever the versions."""
+"""Columns that identify the trial of a row."""
 
 KEYS: Final = (*TRIAL, "status", "message")
 TIMED: Final = ["formulation", "solver", "scenario"]
-"""What says which times a row is of."""
+"""Columns that identify the cell of a row of times."""
 
 SELECTORS: Final = MappingProxyType(
     {"formulation": "name", "solver": "name", "scenario": "family", "plant": "name"}
 )
-"""Columns that hold selectors, and what the part before the brackets is called."""
+"""Columns of selectors, with the name of the part before the brackets."""
 
-RATES: Final = (100, 200, 500, 1000)
-"""Control rates [Hz] whose deadlines are counted."""
+CONTROL_RATES_HZ: Final = (100, 200, 500, 1000)
+"""Control rates whose missed deadlines are counted."""
 
 TIMES: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
     {
         "kinematics_time_median_us": ("REAL", "median time of kinematics and tasks [us]"),
-        "formulation_time_median_us": (
-            "REAL",
-            "median time of one call of the formulation with its solver [us]",
-        ),
+        "formulation_time_median_us": ("REAL", "median time of a call with its solver [us]"),
         "formulation_own_time_median_us": ("REAL", "median of it outside the solver [us]"),
         "solver_core_time_median_us": ("REAL", "median of it in the library's solving call [us]"),
-        "solver_wrapper_time_median_us": (
-            "REAL",
-            "median of it between formulation and library [us]",
-        ),
+        "solver_wrapper_time_median_us": ("REAL", "median of it in the solver's wrapper [us]"),
         "formulation_time_p99_us": ("REAL", "99 % quantile of the call [us]"),
         "formulation_time_p999_us": ("REAL", "99.9 % quantile of the call [us]"),
         "formulation_time_max_us": ("REAL", "longest call [us]"),
@@ -42,13 +36,13 @@ TIMES: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
                 "REAL",
                 f"share of the steps, kinematics included, longer than a period at {rate} Hz",
             )
-            for rate in RATES
+            for rate in CONTROL_RATES_HZ
         },
         "timing_samples": ("INTEGER", "number of calls timed"),
         "timing_stability": ("TEXT", "stable, or why the times cannot be trusted"),
     }
 )
-"""Columns of the timing pass: type in the store, and what they say."""
+"""Columns of the timing pass: type in the store, and definition."""
 
 RENAMED_TIMES: Final[Mapping[str, str]] = MappingProxyType(
     {
@@ -60,27 +54,27 @@ RENAMED_TIMES: Final[Mapping[str, str]] = MappingProxyType(
         "timing_verdict": "timing_stability",
     }
 )
-"""Columns of times of older results, and what they are called today."""
+"""Columns of times of older results, and their names today."""
 
 RENAMED_METRICS: Final[Mapping[str, str]] = MappingProxyType(
     {"off_course_max_rad": "direction_error_max_rad"}
 )
-"""Metrics of older results, and what they are called today."""
+"""Metrics of older results, and their names today."""
 
 RENAMED: Final[Mapping[str, str]] = MappingProxyType({**RENAMED_TIMES, **RENAMED_METRICS})
-"""Columns of older results, and what they are called today."""
+"""Columns of older results, and their names today."""
 
 REDEFINED: Final = ("path_done_share", "lag_max_s", "lag_final_s")
 """Metrics that version 0.1 took of the position alone: what it stored of them is not read."""
 
 DESCRIBED: Final = MappingProxyType(
     {
-        "id": ("", "hash of everything that the trial is made of"),
+        "id": ("", "hash of everything that the trial consists of"),
         "formulation": ("", "selector of the formulation"),
         "solver": ("", "selector of its solver; none for a formulation that needs none"),
         "scenario": ("", "selector of the scenario"),
         "plant": ("", "selector of the plant"),
-        "reference": ("", "what moved the reference on: time or path"),
+        "reference": ("", "what advanced the reference: time or path"),
         "seed": ("", "seed of the scenario"),
         "status": ("", "how the trial ended"),
         "message": ("", "why, where it did not end well"),
@@ -92,4 +86,4 @@ DESCRIBED: Final = MappingProxyType(
         **{name: ("us" if name.endswith("_us") else "", text) for name, (_, text) in TIMES.items()},
     }
 )
-"""Unit and definition of the columns of trials that are no metrics."""
+"""Unit and definition of the columns of trials that are not metrics."""

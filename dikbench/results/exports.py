@@ -1,4 +1,4 @@
-"""What a run exports, read back: results that were committed without their store."""
+"""Reading of exported results, which are committed without their store."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ MANIFEST: Final = "manifest.json"
 
 TEXT: Final = ("id", *(key for key in KEYS if key != "seed"), "environment", "timing_stability")
 NEEDED: Final = tuple(name for name in KEYS if name != "message")
-"""Columns without which a row says nothing."""
+"""Columns that every row must have."""
 
 
 def are_exported(folder: Path) -> bool:
-    """Whether a folder holds exported trials: as CSV or, a fifth of it, as Parquet."""
+    """Say whether a folder holds exported trials, as CSV or as Parquet."""
     return (folder / TRIALS).is_file() or (folder / PARQUET).is_file()
 
 
 def read_trials(folder: Path, notes: list[str]) -> pd.DataFrame:
-    """The trials as the store had them; columns that were not known then lack.
+    """Read the trials as the store had them; columns unknown then are missing.
 
     Args:
         folder: the results folder.
-        notes: gets a sentence about what is damaged and was left out.
+        notes: a sentence about damaged rows that are left out is appended.
 
     Raises:
-        DikbenchError: if there are none, or not what a run writes.
+        DikbenchError: if there are none, or they are damaged.
     """
     if not (folder / TRIALS).is_file() and (folder / PARQUET).is_file():
         return _parquet(folder / PARQUET).rename(columns=RENAMED)
@@ -49,7 +49,7 @@ def read_trials(folder: Path, notes: list[str]) -> pd.DataFrame:
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """The description of the run.
+    """Read the description of the run.
 
     Raises:
         DikbenchError: if it cannot be read.
@@ -66,7 +66,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 def _parquet(file: Path) -> pd.DataFrame:
     try:
         trials = pd.read_parquet(file)
-    except (OSError, ValueError) as error:  # Arrow's own are among them
+    except (OSError, ValueError) as error:  # with Arrow's own errors
         reason = " ".join(str(error).split())
         raise DikbenchError(f"{file}: not a table of trials: {reason}") from None
     for name in NEEDED:
@@ -76,7 +76,7 @@ def _parquet(file: Path) -> pd.DataFrame:
 
 
 def _rows(file: Path, notes: list[str]) -> pd.DataFrame:
-    """The rows of a CSV file as texts, without those that are cut off or have too many values."""
+    """Read the rows of a CSV file as texts, except those that are cut off or too long."""
     if not file.is_file():
         raise DikbenchError(
             f"no results in {file.parent}: neither results.sqlite nor {file.name} is there"
@@ -91,7 +91,9 @@ def _rows(file: Path, notes: list[str]) -> pd.DataFrame:
         if header.count(name) != 1:
             often = "no column" if name not in header else "more than one column"
             raise DikbenchError(f"{file}: not a table of trials: it has {often} {name!r}")
-    ended = lines[1:] if text.endswith("\n") else lines[1:-1]  # a value that was cut may look whole
+    ended = (
+        lines[1:] if text.endswith("\n") else lines[1:-1]
+    )  # a value that was cut may look complete
     whole = [line for line in ended if len(line) == len(header)]
     rows = pd.DataFrame(whole, columns=header)
     rows = rows.loc[:, ~rows.columns.duplicated()]
@@ -103,9 +105,9 @@ def _rows(file: Path, notes: list[str]) -> pd.DataFrame:
 
 
 def _numbers(texts: pd.Series) -> pd.Series:
-    """Integers where all are, else floats, empty ones missing, else what they were.
+    """Convert texts to integers where all are, else to floats, else leave them as they are.
 
-    By Python's own reading: that of pandas errs in the last bit.
+    Python converts them, since pandas is wrong in the last bit.
     """
     kinds: tuple[type, ...] = (int, float)
     for kind in kinds:

@@ -10,16 +10,12 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from dikbench.errors import DikbenchError
-from dikbench.results.exports import (
-    MANIFEST,
-    PARQUET,
-    TRIALS,
-)
+from dikbench.results.exports import MANIFEST, PARQUET, TRIALS
 from dikbench.results.store import Store
 
 
 class ResultsFolder:
-    """Where a run writes.
+    """A folder to which a run writes.
 
     Attributes:
         path: the folder.
@@ -30,11 +26,11 @@ class ResultsFolder:
 
     @property
     def traces(self) -> Path:
-        """One compressed file of arrays per trial."""
+        """The folder of traces, one file per trial."""
         return self.path / "traces"
 
     def trace(self, trial: str) -> Path:
-        """The trace of a trial, by its id."""
+        """Return the file of a trial's trace, by the trial's id."""
         return self.traces / f"{trial}.arrow"
 
     @property
@@ -46,7 +42,7 @@ class ResultsFolder:
         """Keep other runs out of the folder, making it where it is missing.
 
         Raises:
-            DikbenchError: if it cannot be written, or another run is at work in it.
+            DikbenchError: if it cannot be written, or another run uses it.
         """
         try:
             self.traces.mkdir(parents=True, exist_ok=True)
@@ -78,7 +74,7 @@ class ResultsFolder:
             raise DikbenchError(f"no results in {self.path}: {self.database.name} is missing")
 
     def open_store(self, *, add_metrics: bool = False) -> Store:
-        """The store that is there already.
+        """Open the store, which must exist.
 
         Args:
             add_metrics: see `Store`.
@@ -111,7 +107,7 @@ class ResultsFolder:
 
 
 def _replace(path: Path, write: Callable[[Path], object]) -> None:
-    """Write a file in one move."""
+    """Write a file and move it into place."""
     partial = path.with_name(path.name + ".partial")
     write(partial)
     partial.replace(path)

@@ -1,4 +1,4 @@
-"""The one reader of results folders: from the store, else from the files that are committed."""
+"""The reader of results folders: from the store, else from the exported files."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class _Study(msgspec.Struct):
 
 
 class Manifest(msgspec.Struct):
-    """What a report reads of a manifest; other versions may say more, and less."""
+    """The parts of a manifest that a report uses; other versions may have more or less."""
 
     study: _Study
     trials: int = 0
@@ -59,7 +59,7 @@ class Manifest(msgspec.Struct):
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """What a results folder holds.
+    """The contents of a results folder.
 
     Attributes:
         folder: the folder.
@@ -68,7 +68,7 @@ class Results:
             parameters as columns of their own (`formulation_name`, `formulation_damping`,
             `scenario_family`, `scenario_miss`, ...), missing where a selector does not name them.
             `attrs["units"]` and `attrs["definitions"]` say what a column is in.
-        notes: sentences about what is missing or was left out, where results are read leniently.
+        notes: sentences about what is missing or left out, where results are read leniently.
     """
 
     folder: ResultsFolder
@@ -120,8 +120,8 @@ def read_results(path: Path, *, lenient: bool = False) -> Results:
 
     Args:
         path: the folder.
-        lenient: whether to say what is missing or damaged in notes and to give what is left, with
-            every column that this dikbench knows, instead of raising.
+        lenient: whether to note what is missing or damaged instead of raising, and to return the
+            rest with every column that this version knows.
 
     Raises:
         DikbenchError: if the folder holds no results or, unless lenient, they are damaged.
@@ -145,14 +145,13 @@ def _stored_or_exported(
     folder: ResultsFolder, *, lenient: bool
 ) -> tuple[pd.DataFrame, dict[str, Any], list[str]]:
     notes: list[str] = []
-    exported = are_exported(folder.path)
-    if not exported or folder.database.is_file():
+    if folder.database.is_file():
         try:
             with folder.open_store() as store:
                 trials, manifest = store.trials(), store.manifest()
                 versions = sorted({_version(made) for made in store.environments()})
         except DikbenchError as error:
-            if not exported or not (lenient or isinstance(error, OtherVersion)):
+            if not are_exported(folder.path) or not (lenient or isinstance(error, OtherVersion)):
                 raise
             if lenient:
                 notes.append(f"Read from trials.csv, for the store cannot be read: {error}.")
@@ -176,7 +175,7 @@ def _version(environment: dict[str, Any]) -> str:
 
 
 def _complete(rows: pd.DataFrame, notes: list[str]) -> pd.DataFrame:
-    """Return the rows with every known column, numbers as numbers; what is no number is empty."""
+    """Return the rows with every known column, numbers as numbers or empty."""
     lacking = [name for name in METRICS if name not in rows]
     if lacking:
         notes.append(
@@ -222,7 +221,7 @@ def _is_selector(text: str) -> bool:
 
 
 def _manifest(folder: Path, notes: list[str]) -> dict[str, Any]:
-    """Read the description of a run; a short one stands in where it cannot be read."""
+    """Read the description of a run, or return a short one where it cannot be read."""
     try:
         found = read_manifest(folder)
         msgspec.convert(found, Manifest)
@@ -233,7 +232,7 @@ def _manifest(folder: Path, notes: list[str]) -> dict[str, Any]:
 
 
 def _described(trials: pd.DataFrame) -> pd.DataFrame:
-    """Note units and definitions of the columns; empty where this version knows none."""
+    """Attach units and definitions of the columns; empty where unknown to this version."""
     known = {
         **DESCRIBED,
         **{metric.name: (metric.unit, metric.definition) for metric in METRICS.values()},

@@ -15,29 +15,26 @@ from dikbench.simulation.status import STEP_STATUSES
 from dikbench.simulation.trace import Trace
 
 JOINT_UNIT: Final = "rad"
-"""Of revolute joints; coordinates of prismatic ones are in m."""
+"""Unit of revolute joints; prismatic ones are in m."""
 
 STEP_COLUMNS: Final = MappingProxyType(
     {
         "id": ("", "the trial"),
         "step": ("", "number of the control step, from 0"),
-        "time_s": ("s", "when the step begins"),
+        "time_s": ("s", "time at the start of the step"),
         "tau_s": ("s", "nominal time on the reference"),
         "status": ("", "how the step ended"),
         "relaxed": ("", "joints whose acceleration bound was given up"),
-        "claimed": ("", "whether the solver said that it solved the step's programs; -1: none"),
-        "verified": ("", "whether the recheck says so; -1: none"),
+        "claimed": ("", "whether the solver claimed to solve the step's programs; -1: none"),
+        "verified": ("", "whether the recheck confirmed it; -1: none"),
         "primal": ("", "largest primal residual"),
         "dual": ("", "largest dual residual"),
         "gap": ("", "largest duality gap"),
         "distance_rad_s": ("rad/s", "largest distance from the optimum"),
         "q": (JOINT_UNIT, "configuration before the step, a column per coordinate"),
         "wanted": ("m/s, rad/s", "desired twist of the task frame, a column per tracked row"),
-        "commanded": (
-            f"{JOINT_UNIT}/s",
-            "velocity that the formulation commanded, a column per joint",
-        ),
-        "applied": (f"{JOINT_UNIT}/s", "velocity that the plant made of it, a column per joint"),
+        "commanded": (f"{JOINT_UNIT}/s", "velocity of the formulation, a column per joint"),
+        "applied": (f"{JOINT_UNIT}/s", "velocity that the plant applied, a column per joint"),
     }
 )
 """Unit and definition of the columns of the control steps; the last four stand for several."""

@@ -27,9 +27,9 @@ from dikbench.results.columns import (
 from dikbench.study.plan import PlannedTrial
 from dikbench.study.trial import Trial
 
-SCHEMA: Final = 3
-"""Version of the tables below. In a store of version 1, whose times have other names, or of version
-2, whose metrics have, they are renamed when it is opened; another one is not read."""
+SCHEMA_VERSION: Final = 3
+"""Version of the tables below. Stores of versions 1 and 2 are brought to it when they are opened;
+other versions are refused."""
 
 NUMBERS: Final = (*METRICS, "wall_time_s", "control_time_s")
 
@@ -56,23 +56,23 @@ CREATE TABLE times (
   PRIMARY KEY (formulation, solver, scenario)
 );
 """
-"""A trial's `position` is its place in the plan of the last run; without one it is not part of it
-and shown after it. It is `superseded`, kept but not shown, where the plan has a trial with the same
-selectors whose formulation or scenario has another source."""
+"""A trial's `position` is its place in the plan of the last run; without one it is not part of the
+plan and shown last. It is `superseded`, kept but not shown, where the plan has a trial with the
+same selectors whose formulation or scenario has another source."""
 
 
 class OtherVersion(DikbenchError):
-    """A store that a dikbench with other tables or metrics wrote."""
+    """A store of a version with other tables or metrics."""
 
 
 @dataclass(frozen=True)
 class StoredTrial:
-    """What identifies a row.
+    """The identity of a row.
 
     Attributes:
         id: see `trial_id`.
         trial: the cell.
-        steps: number of control steps that it made.
+        steps: number of its control steps.
     """
 
     id: str
@@ -98,25 +98,27 @@ class Store:
             self._database.execute("PRAGMA synchronous = NORMAL")
             if self._database.execute("SELECT COUNT(*) FROM sqlite_master").fetchone()[0]:
                 self._check_schema(add_metrics=add_metrics)
-            else:  # a new file, or one whose run was killed before it had tables
+            else:  # a new file, or one of a run that was killed before it had tables
                 with self._transaction():
                     for statement in TABLES.split(";\n"):
                         self._database.execute(statement)
-                    self._database.execute("INSERT INTO meta VALUES ('schema', ?)", [str(SCHEMA)])
+                    self._database.execute(
+                        "INSERT INTO meta VALUES ('schema', ?)", [str(SCHEMA_VERSION)]
+                    )
                 self._database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
         self._file = path.stat()
         self._environments = {row[0] for row in self._rows("SELECT id FROM environments")}
 
     def __enter__(self) -> Self:
-        """Use the store."""
+        """Return the store."""
         return self
 
     def __exit__(self, *error: object) -> None:
-        """Close it; what was committed stays."""
+        """Close the store; committed rows are kept."""
         self._database.close()
 
     def begin_run(self, manifest: Mapping[str, Any], planned: Sequence[PlannedTrial]) -> int:
-        """Note that a run begins; its plan says in which order rows are shown.
+        """Record the beginning of a run; its plan says in which order rows are shown.
 
         Returns:
             The number of the run.
@@ -143,11 +145,11 @@ class Store:
         self._database.executemany("UPDATE trials SET superseded = 1 WHERE id = ?", old)
 
     def statuses(self) -> dict[str, str]:
-        """The status of every trial that has a row, by id."""
+        """Return the status of every trial that has a row, by id."""
         return dict(self._rows("SELECT id, status FROM trials"))
 
     def stored_trials(self) -> list[StoredTrial]:
-        """Every trial that is shown."""
+        """List every trial that is shown."""
         rows = self._rows(f"SELECT id, steps, {', '.join(TRIAL)} FROM trials WHERE NOT superseded")
         return [
             StoredTrial(name, Trial.of(**dict(zip(TRIAL, cell, strict=True))), steps)
@@ -155,14 +157,14 @@ class Store:
         ]
 
     def timed(self) -> set[str]:
-        """The ids of the cells that have times."""
+        """Return the ids of the cells that have times."""
         return {row[0] for row in self._rows("SELECT id FROM times")}
 
     def environment(self, description: Mapping[str, Any]) -> str:
-        """Keep the description of a process; the same one is kept once.
+        """Store the description of a process, each once.
 
         Returns:
-            Its name, for rows to refer to.
+            Its name, which rows refer to.
         """
         text = json.dumps(description, sort_keys=True)
         name = hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
@@ -172,7 +174,7 @@ class Store:
         return name
 
     def record_trial(self, row: Mapping[str, Any], run: int, position: int) -> None:
-        """Commit the row of a finished trial; an earlier one of the same trial is replaced."""
+        """Commit the row of a finished trial, replacing an earlier one."""
         columns = ("id", *KEYS, "steps", *NUMBERS, "environment")
         values = {name: row.get(name) for name in columns}
         self._insert("trials", {**values, "run": run, "position": position})
@@ -192,7 +194,7 @@ class Store:
         self._insert("times", {**{name: row.get(name) for name in columns}, "run": run})
 
     def trials(self) -> pd.DataFrame:
-        """Every trial, those of the last run's plan first and in its order; with their times."""
+        """Return every trial with its times, those of the last plan first and in its order."""
         order = ", ".join(["id", *KEYS, "steps", *NUMBERS, "environment", "run"])
         trials = self._frame(
             f"SELECT {order} FROM trials WHERE NOT superseded "
@@ -202,13 +204,13 @@ class Store:
         return trials.merge(self.times(), on=TIMED, how="left")
 
     def times(self) -> pd.DataFrame:
-        """The times of every cell."""
+        """Return the times of every cell."""
         numbers = [name for name, (kind, _) in TIMES.items() if kind == "REAL"]
         columns = ", ".join([*TIMED, *TIMES])
         return self._frame(f"SELECT {columns} FROM times ORDER BY {', '.join(TIMED)}", numbers)
 
     def manifest(self) -> dict[str, Any]:
-        """The description of the last run.
+        """Return the description of the last run.
 
         Raises:
             DikbenchError: if there was none.
@@ -228,7 +230,7 @@ class Store:
             )
 
     def environments(self) -> list[dict[str, Any]]:
-        """The descriptions of the processes that made the rows of trials that are shown."""
+        """Return the descriptions of the processes that made the rows that are shown."""
         rows = self._rows(
             "SELECT description FROM environments WHERE id IN "
             "(SELECT environment FROM trials WHERE NOT superseded)"
@@ -285,7 +287,7 @@ class Store:
             self._database.execute("PRAGMA schema_version").fetchone()
         except sqlite3.DatabaseError as error:
             raise DikbenchError(
-                f"store {self.path}: not a store of dikbench ({error}); move it away to start anew"
+                f"store {self.path}: not a store of dikbench ({error}); move it away and run again"
             ) from None
 
     def _check_schema(self, *, add_metrics: bool) -> None:
@@ -296,10 +298,10 @@ class Store:
             raise DikbenchError(f"store {self.path}: not a store of dikbench: {error}") from None
         if found.get("schema") in {"1", "2"}:
             columns = self._migrate(columns, times=found["schema"] == "1")
-        elif found.get("schema") != str(SCHEMA):
+        elif found.get("schema") != str(SCHEMA_VERSION):
             raise OtherVersion(
                 f"store {self.path}: schema version {found.get('schema')!r} is not known; this "
-                f"dikbench reads version {SCHEMA}"
+                f"dikbench reads versions 1 to {SCHEMA_VERSION}"
             )
         missing = [name for name in NUMBERS if name not in columns]
         if missing and not add_metrics:
@@ -311,10 +313,10 @@ class Store:
             self._database.execute(f"ALTER TABLE trials ADD COLUMN {name} REAL")
 
     def _migrate(self, columns: Sequence[str], *, times: bool) -> list[str]:
-        """Bring the tables of an earlier version to today's; the columns of trials afterwards.
+        """Bring the tables of an earlier version to today's; return the columns of trials.
 
-        Metrics and, of version 1, times get their names of today; what metrics of another
-        definition hold is emptied, to be recomputed.
+        Metrics and, of version 1, times are renamed; values of metrics that have another definition
+        today are deleted, to be recomputed.
         """
         renamed = {old: new for old, new in RENAMED_METRICS.items() if old in columns}
         with self._guarded(), self._transaction():
@@ -325,11 +327,13 @@ class Store:
                     self._database.execute(f"UPDATE trials SET {name} = NULL")
             for old, new in RENAMED_TIMES.items() if times else ():
                 self._database.execute(f"ALTER TABLE times RENAME COLUMN {old} TO {new}")
-            self._database.execute("UPDATE meta SET value = ? WHERE key = 'schema'", [str(SCHEMA)])
+            self._database.execute(
+                "UPDATE meta SET value = ? WHERE key = 'schema'", [str(SCHEMA_VERSION)]
+            )
         return [renamed.get(name, name) for name in columns]
 
     def _check_untouched(self) -> None:
-        """A file that is removed or cut under an open database takes rows without a word."""
+        """Check that the file is still there: SQLite would write to a removed one in silence."""
         try:
             now = self.path.stat()
         except OSError:

@@ -1,4 +1,4 @@
-"""How fast a joint may approach a limit and still brake before it."""
+"""The largest speeds from which a joint can still brake before a limit."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 from dikbench.arrays import Array
 
 UNBRAKED_DISTANCE_RAD: Final = 1e6
-"""Distance from which a position limit brakes nothing: infinity stays out of the formulas."""
+"""From here on a position limit does not bound the speed; keeps infinity out of formulas."""
 
 LEAST_DECELERATION_RAD_S2: Final = 1e-9
-"""Deceleration below which a joint counts as having none; it keeps step counts finite."""
+"""Smaller decelerations are raised to this one, which keeps the number of braking steps finite."""
 
 
 def viable_brake(distance: Array, deceleration: Array, dt: float) -> Array:

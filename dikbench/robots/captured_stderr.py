@@ -1,4 +1,4 @@
-"""What a C++ library writes to standard error, kept instead of shown."""
+"""Capture what a C++ library writes to standard error."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def captured_stderr() -> Iterator[Callable[[], str]]:
-    """Redirect file descriptor 2 for a while; the value yielded reads what came so far."""
+    """Redirect file descriptor 2; yield a function that reads what was written so far."""
     before = os.dup(2)
     with tempfile.TemporaryFile() as file:
         os.dup2(file.fileno(), 2)

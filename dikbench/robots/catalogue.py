@@ -1,4 +1,4 @@
-"""The robots that are known by name, and robots from a user's URDF."""
+"""The robots known by name, and robots from a user's URDF."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ HALF_SITTING = (
     *(-0.258470, -0.6, 0.0002, -1.2, 0, 0, 0.1),
     *(0, 0),
 )
-"""Base, left and right leg, torso, left and right arm, head: Talos' own half-sitting posture (its
-SRDF), the elbows bent from 0.5 to 1.2 rad and the arms 0.4 rad farther from the body, away from
+"""Base, left and right leg, torso, left and right arm, head: the half-sitting posture of Talos'
+SRDF with the elbows bent from 0.5 to 1.2 rad and the arms 0.4 rad farther from the body, away from
 limits."""
-UR_PAIRS = "ur_description/srdf/ur5_gripper.srdf"
-"""Of the UR5; its sisters have the same links in the same order."""
-UR_BRAKING = (
+UR_SRDF = "ur_description/srdf/ur5_gripper.srdf"
+"""The UR5's; the UR3 and the UR10 have the same links in the same order."""
+UR_ACCELERATION_SOURCE = (
     "joint speed limit over 0.5 s, the braking ramp that the safety system enforces "
     "(UR10/CB3 user manual, safety inputs)"
 )
@@ -53,15 +53,15 @@ UR_BRAKING = (
 
 @dataclass(frozen=True)
 class CatalogueEntry:
-    """What must be known of a robot beyond its model file.
+    """A robot of the catalogue: its model and what the model file does not contain.
 
     Attributes:
         summary: one line for `dikbench list robots`.
         model: builds the Pinocchio model.
         frame: the default task frame.
-        start: a safe start, away from limits and singularities, (nv,): joint by joint [rad].
-        acceleration: acceleration limits, (nv,) [rad/s^2] (no model file carries any), or None.
-        acceleration_source: where they come from.
+        start: a safe start, away from limits and singularities, (nv,) [rad].
+        acceleration: acceleration limits, (nv,) [rad/s^2], or None; no model file has any.
+        acceleration_source: where they are from.
         task_rows: see `Robot`.
     """
 
@@ -72,6 +72,19 @@ class CatalogueEntry:
     acceleration: tuple[float, ...] | None
     acceleration_source: str
     task_rows: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
+
+
+def _universal_robot(
+    name: str, sister: str, acceleration: tuple[float, float, float, float, float, float]
+) -> CatalogueEntry:
+    return CatalogueEntry(
+        summary=f"Universal Robots {name.upper()}, 6 joints, {sister}",
+        model=DataModel(f"ur_description/urdf/{name}_robot.urdf", srdf=UR_SRDF),
+        frame="tool0",
+        start=UR_START,
+        acceleration=acceleration,
+        acceleration_source=UR_ACCELERATION_SOURCE,
+    )
 
 
 ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
@@ -88,29 +101,10 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
             acceleration=(15, 7.5, 10, 12.5, 15, 20, 20),
             acceleration_source="Franka Control Interface, joint limits of the Panda",
         ),
-        "ur3": CatalogueEntry(
-            summary="Universal Robots UR3, 6 joints, the UR5's small sister",
-            model=DataModel("ur_description/urdf/ur3_robot.urdf", srdf=UR_PAIRS),
-            frame="tool0",
-            start=UR_START,
-            acceleration=(4.32, 4.32, 6.3, 6.4, 6.4, 6.4),
-            acceleration_source=UR_BRAKING,
-        ),
-        "ur5": CatalogueEntry(
-            summary="Universal Robots UR5, 6 joints, spherical-like wrist",
-            model=DataModel("ur_description/urdf/ur5_robot.urdf", srdf=UR_PAIRS),
-            frame="tool0",
-            start=UR_START,
-            acceleration=(6.3, 6.3, 6.3, 6.4, 6.4, 6.4),
-            acceleration_source=UR_BRAKING,
-        ),
-        "ur10": CatalogueEntry(
-            summary="Universal Robots UR10, 6 joints, the UR5's longer sister",
-            model=DataModel("ur_description/urdf/ur10_robot.urdf", srdf=UR_PAIRS),
-            frame="tool0",
-            start=UR_START,
-            acceleration=(4.32, 4.32, 6.3, 6.4, 6.4, 6.4),
-            acceleration_source=UR_BRAKING,
+        "ur3": _universal_robot("ur3", "the UR5's small sister", (4.32, 4.32, 6.3, 6.4, 6.4, 6.4)),
+        "ur5": _universal_robot("ur5", "spherical-like wrist", (6.3, 6.3, 6.3, 6.4, 6.4, 6.4)),
+        "ur10": _universal_robot(
+            "ur10", "the UR5's longer sister", (4.32, 4.32, 6.3, 6.4, 6.4, 6.4)
         ),
         "xarm7": CatalogueEntry(
             summary="UFACTORY xArm7, 7 joints; its zero posture is singular",
@@ -234,7 +228,7 @@ def load_robot(name_or_urdf: str, frame: str | None = None, *, start: object = N
         name_or_urdf: a name of `dikbench list robots`, or the path of a URDF file.
         frame: the task frame; default: the catalogue's. A URDF has no default.
         start: the safe start, shape (nq,) [rad]; default: the catalogue's, for a URDF the
-            best-conditioned of a few dozen seeded postures inside the limits.
+            best-conditioned of 64 seeded postures inside the limits.
 
     Raises:
         DikbenchError: on an unknown robot or frame, a file that is missing or does not parse, or a
@@ -305,7 +299,7 @@ def _load_urdf(path: str, frame: str | None) -> Robot:
 
 
 def _well_conditioned_start(model: Any, frame: str) -> Array:
-    """The posture with the largest smallest singular value among a few dozen inside the limits."""
+    """Choose the posture with the largest smallest singular value among 64 seeded ones."""
     data, index = model.createData(), frame_id(model, frame)
     limits = model_limits(model)
     assert limits.position is not None
@@ -321,7 +315,7 @@ def _well_conditioned_start(model: Any, frame: str) -> Array:
         q = pin.integrate(model, neutral, x)
         q[limits.q_index] = np.where(np.isfinite(limits.position.upper), x, q[limits.q_index])
         J = pin.computeFrameJacobian(model, data, q, index, pin.LOCAL)
-        J = J.reshape(6, model.nv)  # of a single joint Pinocchio gives a vector
+        J = J.reshape(6, model.nv)  # Pinocchio returns a vector for a single joint
         sigma = np.linalg.svd(J, compute_uv=False)[min(6, model.nv) - 1]
         if sigma > best_sigma:
             best, best_sigma = q, float(sigma)

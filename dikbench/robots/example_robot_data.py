@@ -1,4 +1,4 @@
-"""Models from the package example-robot-data, which is data without a Python module."""
+"""Models from the package example-robot-data, which has no Python module."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class DataModel:
     Attributes:
         urdf: path of the file.
         moving: names of the joints that move, the others are locked at zero; empty: all.
-        root: makes the joint (`root_joint`, which moves) between world and robot; None: it is
+        root: makes the moving joint (`root_joint`) between world and robot; None if the robot is
             fixed.
-        srdf: path of the file that says which links cannot collide, if there is one.
+        srdf: path of the file that lists which links cannot collide, or None.
     """
 
     urdf: str
@@ -38,7 +38,7 @@ class DataModel:
         return pin.buildReducedModel(model, self._locked(model), pin.neutral(model))
 
     def visuals(self) -> Any:
-        """Build what is drawn of it, meshes among them (`pinocchio.GeometryModel`)."""
+        """Build its visual geometry with meshes (`pinocchio.GeometryModel`)."""
         model = self._whole()
         visuals = urdf_visuals(model, data_file(self.urdf), _data_folder().parents[1])
         if not self.moving:
@@ -57,12 +57,12 @@ class DataModel:
 
 
 def urdf_visuals(model: Any, file: str, packages: Path) -> Any:
-    """Build what a URDF says is to be drawn (`pinocchio.GeometryModel`).
+    """Build the visual geometry of a URDF (`pinocchio.GeometryModel`).
 
     Args:
         model: the Pinocchio model of the whole file.
         file: the URDF.
-        packages: folder in which the packages lie that its meshes name.
+        packages: folder of the packages that its meshes refer to.
 
     Raises:
         ValueError: if a mesh is not found or not read.
@@ -71,12 +71,12 @@ def urdf_visuals(model: Any, file: str, packages: Path) -> Any:
 
 
 def joints(pattern: str, first: int, last: int) -> tuple[str, ...]:
-    """Names with consecutive numbers in the place of the braces of a pattern."""
+    """Number names consecutively in the place of the braces of a pattern."""
     return tuple(pattern.format(number) for number in range(first, last + 1))
 
 
 def data_file(path: str) -> str:
-    """Where a file of the package's folder `robots` is installed."""
+    """Return where a file of the package's folder `robots` is installed."""
     return str(_data_folder() / path)
 
 

@@ -10,8 +10,6 @@ import pinocchio as pin
 from dikbench.arrays import Array
 from dikbench.robots.robot import Robot
 
-LOCAL = pin.LOCAL  # looked up once: this is asked in every control step
-
 
 class Kinematics:
     """The robot at one configuration: placements and Jacobians of its frames.
@@ -35,32 +33,32 @@ class Kinematics:
         pin.computeJointJacobians(self._model, self._data, q)
 
     def placement(self, frame: int) -> Any:
-        """Placement of a frame in the world, as a view into the data: copy it to keep it."""
+        """Compute the placement of a frame in the world, as a view: copy it to keep it."""
         return pin.updateFramePlacement(self._model, self._data, frame)
 
     def jacobian(self, frame: int) -> Array:
-        """Body Jacobian of a frame, (6, nv), rows (linear; angular) in the frame's own axes."""
-        J: Array = pin.getFrameJacobian(self._model, self._data, frame, LOCAL)
-        return J if J.ndim == 2 else J[:, None]  # of a single joint Pinocchio makes a vector
+        """Compute the body Jacobian of a frame, (6, nv), rows (linear; angular) in its own axes."""
+        J: Array = pin.getFrameJacobian(self._model, self._data, frame, pin.LOCAL)
+        return J if J.ndim == 2 else J[:, None]  # Pinocchio returns a vector for a single joint
 
     @property
     def spatial_jacobian(self) -> Array:
-        """The twist (linear; angular) that each joint gives, at the world's origin, (6, nv).
+        """Twist (linear; angular) of each joint at the world's origin and in its axes, (6, nv).
 
-        In the world's axes. A wrench there times column k: its power on what joint k moves, per
+        The product of a wrench there and column k is the wrench's power on what joint k moves, per
         unit of the joint's speed.
         """
         J: Array = self._data.J
         return J if J.ndim == 2 else J[:, None]
 
     def place_bodies(self, geometry: Any, placed: Any) -> None:
-        """Put the bodies of a `pinocchio.GeometryModel`, its data, where the robot has them."""
+        """Place the bodies of a `pinocchio.GeometryModel` (in its data) at this configuration."""
         pin.updateGeometryPlacements(self._model, self._data, geometry, placed)
 
     def centre_of_mass(self) -> tuple[Array, Array]:
-        """Centre of mass (3,) [m] and its Jacobian (3, nv), in the axes of the world.
+        """Compute the centre of mass (3,) [m] and its Jacobian (3, nv), in the world's axes.
 
-        Not finite if the model has no mass.
+        Both are not finite if the model has no mass.
         """
         J: Array = pin.jacobianCenterOfMass(self._model, self._data, self.q, False)
         centre: Array = self._data.com[0].copy()
@@ -68,7 +66,7 @@ class Kinematics:
 
 
 def smallest_singular_value(J: Array) -> float:
-    """The smallest of the min(m, n) singular values of a task Jacobian (m, n)."""
+    """Compute the smallest of the min(m, n) singular values of a task Jacobian (m, n)."""
     return float(np.linalg.svd(J, compute_uv=False)[-1])
 
 

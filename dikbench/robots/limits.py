@@ -12,26 +12,29 @@ import numpy as np
 from dikbench.arrays import Array, Indices
 from dikbench.errors import DikbenchError
 
-NO_LIMIT = 1e20
-"""Magnitudes above this mean "no limit": some models carry the largest double instead of inf."""
+NO_LIMIT_MAGNITUDE = 1e20
+"""A limit above this is none: some models carry the largest double instead of infinity."""
+
+WAY_BACK_SPEED_SHARE = 0.1
+"""Share of the velocity limits at which a violated limit or distance is left."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Interval:
-    """A lower and an upper bound per joint, shape (nv,) each; infinite where there is none."""
+    """A lower and an upper bound per joint, (nv,) each, infinite where a joint has none."""
 
     lower: Array
     upper: Array
 
     def __post_init__(self) -> None:
-        """Keep laws from writing to limits that every later step and trial shares."""
+        """Copy the bounds and make them read-only: all steps and trials share them."""
         for side in ("lower", "upper"):
             bound = np.array(getattr(self, side), dtype=float)
             bound.flags.writeable = False
             object.__setattr__(self, side, bound)
 
     def usage(self, values: Array) -> Array:
-        """Values (..., nv) over the bound on their own side; infinite past a bound of zero."""
+        """Divide values (..., nv) by the bound on their side; infinite past a bound of zero."""
         bound = np.abs(np.where(values > 0, self.upper, self.lower))
         with np.errstate(divide="ignore"):
             share: Array = np.divide(
@@ -42,7 +45,7 @@ class Interval:
 
 @dataclass(frozen=True, eq=False)
 class JointLimits:
-    """What a robot's joints may do, in tangent coordinates; a kind not in force is None.
+    """The limits of a robot's joints in tangent coordinates; a kind not in force is None.
 
     Attributes:
         nv: number of velocities.
@@ -113,21 +116,22 @@ class JointLimits:
                 f"{kind} limit: expected a number or {self.nv} numbers without NaN, "
                 f"got shape {vector.shape}"
             )
-        return np.where(np.abs(vector) > NO_LIMIT, np.copysign(np.inf, vector), vector)
+        return np.where(np.abs(vector) > NO_LIMIT_MAGNITUDE, np.copysign(np.inf, vector), vector)
 
     @cached_property
     def way_back(self) -> tuple[Array, Array] | None:
         """Largest speeds at which a violated lower and upper position limit is left [rad/s].
 
-        A tenth of the velocity limit towards the inside; None where no velocity limit is in force.
+        It is `WAY_BACK_SPEED_SHARE` of the velocity limit; None where none is in force.
         """
         if self.velocity is None:
             return None
-        return 0.1 * self.velocity.upper, -0.1 * self.velocity.lower
+        share = WAY_BACK_SPEED_SHARE
+        return share * self.velocity.upper, -share * self.velocity.lower
 
     @cached_property
     def middle(self) -> Array | None:
-        """Middle of the position limits, (nv,) [rad or m], NaN where a joint has not both.
+        """Middle of the position limits, (nv,) [rad or m], NaN where a joint lacks one.
 
         None where position limits are not in force.
         """
@@ -141,23 +145,16 @@ class JointLimits:
         return middle
 
     def at(self, q: Array) -> Limits:
-        """The limits as seen from configuration q (nq,)."""
-        if self.position is None:
-            return Limits(self, None)
-        return Limits(self, q if self._coordinates_are_q else q[self.q_index])
-
-    @cached_property
-    def _coordinates_are_q(self) -> bool:
-        """Whether q_index is 0, 1, 2, ...: q itself then serves, without a copy."""
-        return bool(np.array_equal(self.q_index, np.arange(self.nv)))
+        """Return the limits as seen from configuration q (nq,)."""
+        return Limits(self, None if self.position is None else q[self.q_index])
 
 
 class Limits(msgspec.Struct, eq=False):
-    """What the robot may do here: the limits of its joints as seen from one configuration.
+    """The limits of a robot's joints as seen from one configuration.
 
     Attributes:
         joint: the limits in force (velocity, acceleration, effort).
-        coordinates: the coordinate of each velocity that position limits bound [rad or m], (nv,);
+        coordinates: the coordinates that position limits bound, one per velocity, (nv,) [rad or m];
             None where position limits are not in force.
     """
 
@@ -176,7 +173,7 @@ class Limits(msgspec.Struct, eq=False):
 
     @property
     def to_upper(self) -> Array | None:
-        """Likewise q_max - q."""
+        """Distance to the upper position limits, q_max - q (see `to_lower`)."""
         if self.coordinates is None or self.joint.position is None:
             return None
         return self.joint.position.upper - self.coordinates

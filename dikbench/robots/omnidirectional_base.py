@@ -1,4 +1,4 @@
-"""A mobile base that moves freely in the plane: the smallest robot with a rotation to get wrong."""
+"""A mobile base that moves freely in the plane."""
 
 from __future__ import annotations
 

@@ -11,14 +11,14 @@ from dikbench.robots.robot import Robot
 
 
 def with_payload(robot: Robot, mass: float, radius: float = 0.05) -> Robot:
-    """The same robot with a solid ball in its hand, centred on the task frame.
+    """Return the same robot with a solid ball in its hand, centred on the task frame.
 
-    The ball's inertia is added to the body that carries the frame; the kinematics stay as they are.
+    The ball's inertia is added to the body that carries the frame; the kinematics do not change.
 
     Args:
         robot: the robot; it is not changed.
-        mass: of the ball [kg].
-        radius: of the ball [m].
+        mass: mass of the ball [kg].
+        radius: its radius [m].
 
     Raises:
         DikbenchError: if mass or radius is not positive and finite.

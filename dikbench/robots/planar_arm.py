@@ -1,4 +1,4 @@
-"""A planar arm of any number of links, built in code: the smallest robot that has everything."""
+"""A planar arm of any number of links, built in code."""
 
 from __future__ import annotations
 
@@ -18,29 +18,19 @@ def planar_arm(
 
     Args:
         lengths: length of each link [m].
-        velocity_limits: of each joint [rad/s].
-        position_limit: lower and upper, of every joint [rad].
+        velocity_limits: largest |v| of each joint [rad/s].
+        position_limit: lower and upper limit of every joint [rad].
 
     Returns:
         A Pinocchio model with the frames `link1`, ... at the end of each link and `tip` at the end
-        of the last one. Every link weighs
-        1 kg, spread evenly along it.
+        of the last one. Every link has 1 kg, spread evenly along it.
     """
     model = pin.Model()
     model.name = f"planar{len(lengths)}r"
     parent, placement = 0, pin.SE3.Identity()
     lower, upper = position_limit
     for number, (length, speed) in enumerate(zip(lengths, velocity_limits, strict=True), start=1):
-        parent = model.addJoint(
-            parent,
-            pin.JointModelRZ(),
-            placement,
-            f"joint{number}",
-            np.array([100.0]),
-            np.array([speed]),
-            np.array([lower]),
-            np.array([upper]),
-        )
+        parent = add_hinge(model, parent, placement, f"joint{number}", (lower, upper), speed)
         model.appendBodyToJoint(
             parent,
             pin.Inertia.FromCylinder(1.0, 0.02, length),
@@ -50,3 +40,16 @@ def planar_arm(
         model.addFrame(pin.Frame(f"link{number}", parent, 0, placement, pin.FrameType.OP_FRAME))
     model.addFrame(pin.Frame("tip", parent, 0, placement, pin.FrameType.OP_FRAME))
     return model
+
+
+def add_hinge(
+    model: Any, parent: int, placement: Any, name: str, limits: tuple[float, float], speed: float
+) -> int:
+    """Add a revolute joint about z with position limits [rad] and a largest speed [rad/s].
+
+    Returns:
+        Pinocchio's index of the joint; its effort limit is 100 N m.
+    """
+    effort, velocity, lower, upper = (np.array([x]) for x in (100.0, speed, *limits))
+    joint = pin.JointModelRZ()
+    return int(model.addJoint(parent, joint, placement, name, effort, velocity, lower, upper))

@@ -11,14 +11,14 @@ import numpy as np
 
 from dikbench.arrays import Array, Indices
 from dikbench.errors import DikbenchError, unknown
-from dikbench.robots.limits import NO_LIMIT, Interval, JointLimits
+from dikbench.robots.limits import NO_LIMIT_MAGNITUDE, Interval, JointLimits
 
 UNCHANGED: Final[Any] = object()
 
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """A robot model as the harness and the laws see it.
+    """A robot model as the harness and formulations see it.
 
     Attributes:
         name: the name under which it was loaded.
@@ -26,14 +26,14 @@ class Robot:
         frame: name of the task frame, in which twists are expressed.
         limits: the limits of the joints that are in force.
         q0: a safe start, shape (nq,): inside the limits, away from singularities.
-        task_rows: the rows of the body twist (linear; angular) that the arm can move at all: all
-            six in space, (0, 1, 5) for an arm in the x-y plane. Tasks on the pose keep to them.
+        task_rows: the rows of the body twist (linear; angular) that the arm can move: all six in
+            space, (0, 1, 5) for an arm in the x-y plane. Pose tasks are restricted to them.
         available_acceleration: acceleration limits [rad/s^2] known for this robot, shape (nv,),
             in force only where a scenario or `with_limits` says so; None where none are known.
-        visuals: builds what is drawn of it (`pinocchio.GeometryModel`), which may raise ValueError
-            where a mesh is missing; None where there is only the chain of joints.
-        urdf: the file of the model, which has its collision geometry; None: built in code.
-        srdf: the file that says which links cannot collide, if there is one.
+        visuals: builds its visual geometry (`pinocchio.GeometryModel`); may raise ValueError where
+            a mesh is missing; None where the robot has none.
+        urdf: the file of the model and its collision geometry; None if built in code.
+        srdf: the file that lists which links cannot collide, or None.
     """
 
     name: str
@@ -48,14 +48,14 @@ class Robot:
     srdf: str | None = None
 
     def __post_init__(self) -> None:
-        """Keep laws from writing to the start, which every later trial shares."""
+        """Copy the start and make it read-only: all trials share it."""
         start = np.array(self.q0, dtype=float)
         start.flags.writeable = False
         object.__setattr__(self, "q0", start)
 
     @cached_property
     def frame_id(self) -> int:
-        """Pinocchio's index of the task frame."""
+        """Return Pinocchio's index of a frame of a model."""
         return frame_id(self.model, self.frame)
 
     @cached_property
@@ -68,7 +68,7 @@ class Robot:
 
     @cached_property
     def scratch(self) -> Any:
-        """A `pinocchio.Data` of its own for laws that need more than the task Jacobian."""
+        """A `pinocchio.Data` for formulations that need more than the task Jacobian."""
         return self.model.createData()
 
     @cached_property
@@ -83,7 +83,7 @@ class Robot:
 
     @cached_property
     def chain(self) -> Indices:
-        """The velocities (indices into v) that move the task frame: not those of a gripper."""
+        """Indices into v of the velocities that move the task frame, without a gripper's."""
         model = self.model
         carrying = model.supports[model.frames[self.frame_id].parentJoint]
         moved = [
@@ -94,7 +94,7 @@ class Robot:
         return np.array([index for indices in moved for index in indices], dtype=np.intp)
 
     def reach_of(self, placement: Any) -> float:
-        """Distance [m] of a placement (`pinocchio.SE3`) from the origin of the first joint."""
+        """Compute the distance [m] of a placement (`pinocchio.SE3`) from the first joint."""
         first = self.model.jointPlacements[1].translation
         return float(np.linalg.norm(placement.translation - first))
 
@@ -106,13 +106,13 @@ class Robot:
         acceleration: object = UNCHANGED,
         effort: object = UNCHANGED,
     ) -> Robot:
-        """The same robot with other limits in force.
+        """Return the same robot with other limits in force.
 
         Args:
             position: None (not in force) or a pair (lower, upper) [rad or m].
             velocity: None, a magnitude, one per joint, or a pair (lower, upper) [rad/s].
-            acceleration: likewise [rad/s^2].
-            effort: likewise [N m].
+            acceleration: the same [rad/s^2].
+            effort: the same [N m].
 
         Raises:
             DikbenchError: on a wrong shape, NaN, or bounds that exclude rest.
@@ -139,7 +139,7 @@ class Robot:
 
 
 def frame_id(model: Any, frame: str) -> int:
-    """Index of a frame of a model.
+    """Return Pinocchio's index of a frame of a model.
 
     Raises:
         DikbenchError: if the model has no frame of this name.
@@ -151,10 +151,10 @@ def frame_id(model: Any, frame: str) -> int:
 
 
 def checked_vector(value: object, size: int, what: str) -> Array:
-    """A finite vector of the given size, copied.
+    """Return a copy of a finite vector of the given size.
 
     Raises:
-        DikbenchError: if it is anything else.
+        DikbenchError: on a wrong size, NaN, infinity, or what is not a number.
     """
     try:
         vector = np.array(value, dtype=float)
@@ -172,19 +172,19 @@ def model_limits(model: Any) -> JointLimits:
 
     Joints with one coordinate and one velocity have position limits; continuous joints, planar
     joints and free-flyers have none (the artificial bounds that some models carry are dropped).
-    A velocity or effort limit of zero means that the model does not say.
+    A velocity or effort limit of zero means that the model has none.
     """
     nv = model.nv
     q_index = np.full(nv, -1)
     lower, upper = np.full(nv, -np.inf), np.full(nv, np.inf)
     for joint in model.joints:
-        # The first one is the universe, which calls itself a revolute joint with index -1.
+        # The first one is the universe, a revolute joint with index -1.
         if joint.idx_v >= 0 and joint.nq == 1 and joint.nv == 1:
             q_index[joint.idx_v] = joint.idx_q
             lower[joint.idx_v] = model.lowerPositionLimit[joint.idx_q]
             upper[joint.idx_v] = model.upperPositionLimit[joint.idx_q]
-    lower[np.abs(lower) > NO_LIMIT] = -np.inf
-    upper[np.abs(upper) > NO_LIMIT] = np.inf
+    lower[np.abs(lower) > NO_LIMIT_MAGNITUDE] = -np.inf
+    upper[np.abs(upper) > NO_LIMIT_MAGNITUDE] = np.inf
     return JointLimits(
         nv=nv,
         q_index=q_index,
@@ -198,5 +198,5 @@ def model_limits(model: Any) -> JointLimits:
 def _symmetric(magnitude: Array) -> Interval:
     # Pinocchio 4.1 fills lowerVelocityLimit of a URDF with the positive magnitude: not read.
     upper = np.array(magnitude, dtype=float)
-    upper[(upper == 0) | (upper > NO_LIMIT)] = np.inf
+    upper[(upper == 0) | (upper > NO_LIMIT_MAGNITUDE)] = np.inf
     return Interval(-upper, upper)

@@ -1,1 +1,1 @@
-"""Running a study: worker processes, the timing pass, and what is written down."""
+"""Running a study: worker processes, the timing pass, and provenance."""

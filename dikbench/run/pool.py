@@ -1,4 +1,4 @@
-"""Worker processes: one cannot hurt another, nor the driver."""
+"""Worker processes, which cannot harm each other or the driver."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ THREAD_VARIABLES: Final = (
 def workers(
     count: int, imports: tuple[str, ...] = (), memory: int | None = None
 ) -> Iterator[ProcessPool]:
-    """A pool of persistent processes, each with one thread, set before it imports anything.
+    """Start persistent worker processes, each limited to one thread before it imports anything.
 
     Args:
         count: number of processes.
         imports: modules that each imports at its start.
-        memory: what each may take beyond its start [MB], where the system can limit it; None: any.
+        memory: limit of its memory beyond that at its start [MB], if the system has limits.
     """
     before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
     main = sys.modules["__main__"]
-    # A new process would import the script that was started: without `if __name__ == "__main__"` in
-    # it, it would begin to run the study as well.
+    # A new process would import the script that was started and, without a guard
+    # `if __name__ == "__main__"` in it, run the study as well.
     sys.modules["__main__"] = ModuleType("__main__")
     os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
     pool = ProcessPool(
@@ -65,14 +65,14 @@ def workers(
 
 
 def available_cores() -> int:
-    """Number of cores that this process may use."""
+    """Return the number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def end_group(process: int) -> None:
-    """End what a worker left behind."""
+    """Kill the process group of a worker."""
     if hasattr(os, "killpg"):
         try:
             os.killpg(process, signal.SIGKILL)

@@ -1,4 +1,4 @@
-"""Progress of long work: a bar on a terminal, a line now and then elsewhere."""
+"""Progress of long work: a bar on a terminal, otherwise a line from time to time."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from typing import Final, Self
 
 from tqdm import tqdm
 
-QUIET_SECONDS: Final = 5.0
-"""Off a terminal, at most one line in this time."""
+SECONDS_BETWEEN_LINES: Final = 5.0
 
 
 class ProgressDisplay:
@@ -28,17 +27,17 @@ class ProgressDisplay:
         )
 
     def __enter__(self) -> Self:
-        """Start."""
+        """Return the display."""
         return self
 
     def advance(self) -> None:
-        """One more is finished."""
+        """Count one more finished piece of work."""
         self._done += 1
         if self._bar is not None:
             self._bar.update()
             return
         now = time.monotonic()
-        if now - self._last >= QUIET_SECONDS or self._done == self._total:
+        if now - self._last >= SECONDS_BETWEEN_LINES or self._done == self._total:
             self._last = now
             rate = self._done / max(now - self._start, 1e-9)
             left = (self._total - self._done) / rate
@@ -51,6 +50,6 @@ class ProgressDisplay:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """End."""
+        """Close the bar."""
         if self._bar is not None:
             self._bar.close()

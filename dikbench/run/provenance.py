@@ -1,4 +1,4 @@
-"""Where numbers come from: the machine, the versions, the commit, the command."""
+"""The provenance of results: machine, versions, commit, command."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ LIBRARIES = (
 
 
 def environment(commit: str | None, command: str) -> dict[str, Any]:
-    """Describe the process that asks: every row refers to the description of its worker.
+    """Describe this process; every row refers to the description of its worker.
 
     Args:
-        commit: see `git_commit`, which asks once for all workers.
+        commit: see `git_commit`.
         command: the command line, as typed.
     """
-    solvers = {name: _version(entry.distribution) for name, entry in BACK_ENDS.items()}
+    solvers = {name: _version(entry.package) for name, entry in BACK_ENDS.items()}
     return {
         "command": command,
         "git_commit": commit,
@@ -63,9 +63,9 @@ def manifest(study: Study, trials: int, description: dict[str, Any]) -> dict[str
 
 
 def git_commit() -> str | None:
-    """The commit of the checkout that dikbench runs from, "+" where it has changes; else None."""
+    """Return the commit of the checkout in use, with "+" where it has changes; else None."""
     try:
-        # A wheel inside somebody's checkout is not a part of it.
+        # A wheel inside another checkout is not part of it.
         _git("ls-files", "--error-unmatch", Path(__file__).name)
         return _git("rev-parse", "HEAD") + ("+" if _git("status", "--porcelain", "-uno") else "")
     except (OSError, subprocess.SubprocessError):
@@ -93,7 +93,7 @@ def _governor() -> str | None:
 def _text(path: str) -> str:
     try:
         return Path(path).read_text(errors="replace")
-    except OSError:  # not this system
+    except OSError:  # not on this system
         return ""
 
 

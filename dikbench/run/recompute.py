@@ -1,4 +1,4 @@
-"""Computes all metrics again from stored traces: a new or a mended metric needs no rerun."""
+"""Recomputes all metrics from stored traces, so that a changed metric needs no rerun."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from dikbench.run.progress_display import ProgressDisplay
 from dikbench.run.provenance import environment, git_commit
 from dikbench.run.runner import Interrupted
 from dikbench.run.trial_row import scenario_of
-from dikbench.run.worker_process import calm_down
+from dikbench.run.worker_process import restore_process
 from dikbench.scenario.scenario import Scenario
 from dikbench.simulation.trace import Trace
 from dikbench.study.identity import trial_id
@@ -27,13 +27,13 @@ from dikbench.study.identity import trial_id
 
 @dataclass(frozen=True)
 class Recomputed:
-    """What became of the trials of a folder; those that were not recomputed keep their values.
+    """The outcome of a recomputation; trials that are not recomputed keep their values.
 
     Attributes:
-        done: number of trials whose metrics were computed again.
-        without_trace: number of those that have moved, but whose trace was not kept.
-        changed: number of those whose formulation or scenario is another one today.
-        failed: reasons of those whose trace cannot be used, by the name of the trial.
+        done: number of trials whose metrics were recomputed.
+        without_trace: number of trials with steps whose trace was not kept.
+        changed: number of trials whose formulation or scenario has changed.
+        failed: reasons why traces cannot be used, by the name of the trial.
     """
 
     done: int
@@ -42,7 +42,7 @@ class Recomputed:
     failed: dict[str, str]
 
     def __str__(self) -> str:
-        """One line."""
+        """Summarise in one line."""
         kept = {
             "without a trace": self.without_trace,
             "whose formulation or scenario has changed since": self.changed,
@@ -56,7 +56,7 @@ class Recomputed:
 def recompute_results(out: Path, jobs: int, command: str) -> Recomputed:
     """Compute every metric of a results folder again from its traces, and export it.
 
-    A trial is only recomputed if its formulation and scenario are still those that it was run with.
+    A trial is recomputed only if its formulation and scenario are unchanged.
 
     Args:
         out: results folder.
@@ -64,7 +64,7 @@ def recompute_results(out: Path, jobs: int, command: str) -> Recomputed:
         command: the command line, for the manifest.
 
     Raises:
-        DikbenchError: if the folder holds no results, no trace at all, or another run is at work.
+        DikbenchError: if the folder has no results or no traces, or another run uses it.
         Interrupted: if the user stops it; what is finished is kept.
     """
     folder = ResultsFolder(out)
@@ -92,7 +92,7 @@ def recompute_results(out: Path, jobs: int, command: str) -> Recomputed:
 
 
 def _is_the_same(stored: StoredTrial) -> bool:
-    """Whether a trial would be this one if it were run today."""
+    """Say whether a trial would have the same id if it were run today."""
     try:
         return trial_id(stored.trial) == stored.id
     except DikbenchError:  # the formulation's file is gone, the scenario has another parameter
@@ -102,9 +102,9 @@ def _is_the_same(stored: StoredTrial) -> bool:
 def _recompute(
     store: Store, folder: ResultsFolder, todo: Sequence[StoredTrial], jobs: int
 ) -> dict[str, str]:
-    """Recompute trials in worker processes and commit each as it comes; the reasons of failures."""
+    """Recompute trials in worker processes and commit each; return the reasons of failures."""
     failed: dict[str, str] = {}
-    # Scenario by scenario: a worker builds each once.
+    # In the order of scenarios, so that a worker builds each once.
     order = sorted(todo, key=lambda stored: (str(stored.trial.scenario), stored.trial.seed))
     with (
         workers(jobs, (__name__,)) as pool,
@@ -118,7 +118,7 @@ def _recompute(
             stored = futures[future]
             try:
                 metrics = future.result()
-            except Exception as error:  # a plug-in's scenario may do anything
+            except Exception as error:  # a plug-in's scenario may raise anything
                 failed[f"{stored.trial} ({stored.id})"] = " ".join(str(error).split())
             else:
                 store.record_metrics(stored.id, metrics)
@@ -129,12 +129,12 @@ def _recompute(
 
 
 def metrics_of(stored: StoredTrial, file: Path) -> dict[str, float]:
-    """In a worker process: the metrics of a trial from its trace.
+    """Compute the metrics of a trial from its trace, in a worker process.
 
     Raises:
         DikbenchError: if the trace cannot be read, or is not one of this trial.
     """
-    calm_down()
+    restore_process()
     scenario = scenario_of(stored.trial.scenario, stored.trial.seed)
     trace = Trace.load(file)
     _check_fits(trace, scenario, stored.steps, file)

@@ -1,4 +1,4 @@
-"""The run of a study: trials in parallel, then times on one core; every row committed at once."""
+"""The run of a study: trials in parallel, then times on one core; rows are committed at once."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ from dikbench.study.plan import PlannedTrial, expand
 from dikbench.study.study import Study
 from dikbench.study.trial import Trial
 
-TIMING_TIMEOUT: Final = 900.0
-"""Wall-clock limit of the timing of one scenario [s]."""
+TIMING_TIMEOUT_S: Final = 900.0
+"""Wall-clock limit of the timing of one scenario."""
 
-FATAL: Final = frozenset(
+FATAL_STATUSES: Final = frozenset(
     status.value for status in (Status.TIMEOUT, Status.CRASHED, Status.OUT_OF_MEMORY)
 )
-"""Ends of a trial after which its formulation is not timed."""
+"""Statuses of a trial after which its formulation is not timed."""
 
-AHEAD: Final = 8
-"""Trials per worker that are handed over ahead: no worker waits, and memory does not grow."""
+TRIALS_HANDED_AHEAD_PER_WORKER: Final = 8
+"""So many that no worker waits, and few enough that memory does not grow."""
 
 
 class Interrupted(Exception):
-    """The user stopped the run; says how much is kept."""
+    """The user stopped the run; the message tells what is kept."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class RunSettings:
     Attributes:
         jobs: number of worker processes.
         trial_timeout: wall-clock limit of a trial [s], enforced from outside its process.
-        trial_memory: memory of a trial beyond what its process has at the start [MB].
+        trial_memory: memory of a trial beyond that of its process at the start [MB].
         traces: which traces are kept.
         rerun: which finished trials are run again: "", "failed", "all", or the selector (or the
             name) of a formulation, scenario or solver.
@@ -71,13 +71,13 @@ def run_study(study: Study, out: Path, settings: RunSettings, command: str) -> R
 
     Args:
         study: what to run.
-        out: results folder; what it holds already is kept.
-        settings: how.
+        out: results folder; its finished trials are kept.
+        settings: how to run it.
         command: the command line, for the manifest.
 
     Raises:
         DikbenchError: if the study or the folder is not valid, before anything runs; if the store
-            fails, after what was committed.
+            fails, with committed rows kept.
         Interrupted: if the user stops the run; what is finished is kept.
     """
     planned = expand(study)
@@ -85,17 +85,21 @@ def run_study(study: Study, out: Path, settings: RunSettings, command: str) -> R
     folder = ResultsFolder(out)
     with folder.lock(), Store(folder.database) as store:
         commit = git_commit()
-        described = environment(commit, command)
-        run = store.begin_run(manifest(study, len(planned), described), planned)
-        done = store.statuses()
+        own = environment(commit, command)
+        run = store.begin_run(manifest(study, len(planned), own), planned)
+        done, positions = store.statuses(), {p.id: number for number, p in enumerate(planned)}
         todo = [p for p in planned if p.id not in done or _again(p, done[p.id], settings.rerun)]
         if len(todo) < len(planned):
             print(f"{len(planned) - len(todo)} of {len(planned)} trials are done", file=sys.stderr)
         try:
-            _run_trials(store, run, folder, todo, settings, commit, command, planned)
+            with ProgressDisplay(len(todo), "trials") as display:
+                for trial, row in run_trials(todo, folder, settings, commit, command):
+                    described = row.pop("described", None)
+                    row["environment"] = None if described is None else store.environment(described)
+                    store.record_trial({"id": trial.id, **row}, run, positions[trial.id])
+                    display.advance()
             if study.timing is not None:
-                again = settings.rerun == "all"
-                _time(store, run, study, planned, again=again)
+                _time(store, run, study, planned, again=settings.rerun == "all")
         except KeyboardInterrupt:
             finished = sum(p.id in store.statuses() for p in planned)
             folder.export(store)
@@ -106,11 +110,11 @@ def run_study(study: Study, out: Path, settings: RunSettings, command: str) -> R
 
 
 def time_study(study: Study, out: Path, command: str) -> ResultsFolder:
-    """Take the times of a study anew, and nothing else.
+    """Repeat the timing pass of a study, and nothing else.
 
     Args:
-        study: whose cells are timed.
-        out: results folder; trials that it holds are kept.
+        study: the study whose cells are timed.
+        out: results folder; its trials are kept.
         command: the command line, for the manifest.
 
     Raises:
@@ -140,36 +144,16 @@ def _check_rerun(rerun: str, planned: Sequence[PlannedTrial]) -> None:
 
 
 def _names(trial: Trial) -> set[str]:
-    """What a trial can be called by: selectors, and names without parameters."""
+    """Return the texts that name a trial: its selectors, and their names alone."""
     selectors = (trial.formulation, trial.scenario, trial.solver)
     return {*map(str, selectors), *(selector.name for selector in selectors)}
 
 
 def _again(planned: PlannedTrial, status: str, rerun: str) -> bool:
-    """Whether a finished trial is to be run again."""
+    """Say whether a finished trial is to be run again."""
     if rerun == "failed":
         return status not in {Status.OK.value, Status.SKIPPED.value}
     return rerun == "all" or rerun in _names(planned.trial)
-
-
-def _run_trials(
-    store: Store,
-    run: int,
-    folder: ResultsFolder,
-    todo: Sequence[PlannedTrial],
-    settings: RunSettings,
-    commit: str | None,
-    command: str,
-    planned: Sequence[PlannedTrial],
-) -> None:
-    """Run trials in worker processes and commit each row as it comes."""
-    positions = {p.id: number for number, p in enumerate(planned)}
-    with ProgressDisplay(len(todo), "trials") as display:
-        for trial, row in run_trials(todo, folder, settings, commit, command):
-            described = row.pop("described", None)
-            row["environment"] = None if described is None else store.environment(described)
-            store.record_trial({"id": trial.id, **row}, run, positions[trial.id])
-            display.advance()
 
 
 def run_trials(
@@ -179,14 +163,14 @@ def run_trials(
     commit: str | None = None,
     command: str = "",
 ) -> Iterator[tuple[PlannedTrial, TrialRow]]:
-    """Run trials in worker processes; the rows come as they finish.
+    """Run trials in worker processes and yield each row when it is finished.
 
     Raises:
         DikbenchError: if a trace cannot be written.
     """
     skipped = [p for p in todo if p.skip]
     yield from ((p, row_without_run(p.trial, Status.SKIPPED, p.skip)) for p in skipped)
-    # Scenario by scenario: a worker builds each once.
+    # In the order of scenarios, so that a worker builds each once.
     first: dict[tuple[Selector, int], int] = {}
     for p in todo:
         first.setdefault((p.trial.scenario, p.trial.seed), len(first))
@@ -198,7 +182,9 @@ def run_trials(
         with workers(settings.jobs, (work.__module__,), settings.trial_memory) as pool:
             running: dict[Future[Any], PlannedTrial] = {}
             while True:
-                for p in islice(waiting, AHEAD * settings.jobs - len(running)):
+                for p in islice(
+                    waiting, TRIALS_HANDED_AHEAD_PER_WORKER * settings.jobs - len(running)
+                ):
                     arguments = (p.trial, folder.trace(p.id), settings.traces, commit, command)
                     future = pool.schedule(work, args=arguments, timeout=settings.trial_timeout)
                     running[future] = p
@@ -214,7 +200,7 @@ def run_trials(
 
 
 def _row(future: Future[Any], trial: Trial, timeout: float) -> TrialRow:
-    """The row of a finished trial, whatever became of it."""
+    """Return the row of a finished trial, however it ended."""
     try:
         row, described = future.result()
     except CannotStore:
@@ -235,10 +221,12 @@ def _row(future: Future[Any], trial: Trial, timeout: float) -> TrialRow:
 def _time(
     store: Store, run: int, study: Study, planned: Sequence[PlannedTrial], *, again: bool
 ) -> None:
-    """The timing pass, in one process of its own when no trial runs."""
+    """Run the timing pass in one process of its own while no trial runs."""
     done, timing = store.statuses(), study.timing
-    # A law that took its process with it in a trial would do so again, and the others' times too.
-    fatal = {(p.trial.formulation, p.trial.solver) for p in planned if done.get(p.id) in FATAL}
+    # A formulation that ended its process in a trial would do so again, and lose all times.
+    fatal = {
+        (p.trial.formulation, p.trial.solver) for p in planned if done.get(p.id) in FATAL_STATUSES
+    }
     cells: list[Contender] = list(
         dict.fromkeys(
             cell
@@ -266,7 +254,7 @@ def _time(
     ):
         futures = {
             scenario: pool.schedule(
-                time_scenario, args=(scenario, study.seeds[0], *arguments), timeout=TIMING_TIMEOUT
+                time_scenario, args=(scenario, study.seeds[0], *arguments), timeout=TIMING_TIMEOUT_S
             )
             for scenario in scenarios
         }
@@ -274,9 +262,7 @@ def _time(
             rows: list[TrialRow] = []
             try:
                 rows = future.result()
-            except (
-                Exception
-            ) as error:  # a formulation can take the process with it: no times, no harm
+            except Exception as error:  # a formulation may end the process: no times
                 reason = f"{type(error).__name__}: {error}".partition("\n")[0]
                 print(f"no times for {scenario}: {reason}", file=sys.stderr)
             for cell, row in zip(cells, rows, strict=False):
@@ -285,7 +271,7 @@ def _time(
 
 
 def status_of(out: Path) -> dict[str, int]:
-    """How many trials of the last study are done, by status, and how many are missing.
+    """Count the trials of the last study by status, and those that are missing.
 
     Raises:
         DikbenchError: if the folder holds no results.

@@ -1,4 +1,4 @@
-"""The timing pass: recorded problems given to every formulation and solver, on one core."""
+"""The timing pass: every formulation and solver on recorded problems, on one core."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from dikbench.arrays import Array
 from dikbench.plugins.building import make_formulation
 from dikbench.problem.posing import pose_problem
 from dikbench.problem.problem import DikProblem, Formulation, Solve
-from dikbench.results.columns import RATES
+from dikbench.results.columns import CONTROL_RATES_HZ
 from dikbench.robots.kinematics import Kinematics
 from dikbench.run.trial_row import TrialRow, scenario_of, solve_of
 from dikbench.scenario.plant import Ideal
@@ -28,21 +28,19 @@ from dikbench.simulation.control_step import TrialEnded, control_step
 from dikbench.solvers.checked_solve import CheckedSolve, make_solve
 from dikbench.statistics.stability import stability_of
 
-LEAD_IN: Final = 5
-"""Problems that are replayed before each timed segment: they bring back what another cell drove out
-of the caches, and a warm start to where the segment begins."""
+LEAD_IN_PROBLEMS: Final = 5
+"""Problems that are solved before each timed segment, which fill the caches and warm starts."""
 
 Contender = tuple[Selector, Selector]
 """The selectors of a formulation and its solver."""
 
-PARTS: Final = ("whole", "own", "core", "wrapper")
-"""The whole call of the formulation, and of it the share of its own code, of the solver library and
-of the library's wrapper."""
+TIME_PARTS: Final = ("whole", "own", "core", "wrapper")
+"""The whole call of the formulation, its own code, the solver library, the library's wrapper."""
 
 
 @dataclass(frozen=True)
 class _Recording:
-    """A formulation that keeps the problems that another one is given."""
+    """A formulation that records the problems of another one."""
 
     formulation: Formulation
     problems: list[DikProblem]
@@ -72,15 +70,15 @@ def time_scenario(
     """Time every cell on one scenario's problems.
 
     In every round each cell solves the whole segment, in a new random order of the cells, so that
-    drift of the machine hits all alike. A sample is one call of the formulation with its solver.
+    drift of the machine affects all equally. A sample is one call of the formulation.
 
     Args:
         selector: the scenario.
         seed: its seed.
         cells: formulations and solvers.
-        reference: the formulation that drives the recorded run.
+        reference: the formulation of the recorded run.
         problems: number of problems.
-        rounds: how often each cell solves all of them.
+        rounds: number of rounds.
 
     Returns:
         A row per cell (see `dikbench.results.columns`).
@@ -90,7 +88,7 @@ def time_scenario(
     timed = [
         (make_formulation(name), solve_of(name, solver, checks=False)) for name, solver in cells
     ]
-    samples = np.full((len(cells), len(PARTS), rounds, len(segment)), np.nan)
+    samples = np.full((len(cells), len(TIME_PARTS), rounds, len(segment)), np.nan)
     kinematics = np.full((rounds, len(segment)), np.nan)
     order = list(range(-1, len(cells)))  # -1: the kinematics, which all cells share
     shuffle = random.Random(0).shuffle
@@ -116,7 +114,7 @@ def time_scenario(
 
 @contextmanager
 def undisturbed() -> Iterator[None]:
-    """Keep this process on one core, where the system lets us, and the garbage collector away."""
+    """Keep this process on one core, if the system allows it, without garbage collection."""
     cores = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set()
     if cores:
         os.sched_setaffinity(0, {max(cores)})
@@ -133,11 +131,11 @@ def undisturbed() -> Iterator[None]:
 def _time_formulation(
     formulation: Formulation, solve: CheckedSolve, segment: Sequence[DikProblem]
 ) -> Array:
-    """Time a formulation on each problem, (parts, problems) [ns]; NaN from where it breaks on."""
-    times = np.full((len(PARTS), len(segment)), np.nan)
+    """Time a formulation on each problem, (parts, problems) [ns]; NaN after it fails."""
+    times = np.full((len(TIME_PARTS), len(segment)), np.nan)
     found = []
     try:
-        for problem in segment[:LEAD_IN]:
+        for problem in segment[:LEAD_IN_PROBLEMS]:
             control_step(formulation, problem, solve)
         for problem in segment:
             answer = control_step(formulation, problem, solve)
@@ -166,12 +164,13 @@ def _time_kinematics(scenario: Scenario, segment: Sequence[DikProblem]) -> Array
 
 def _summary(samples: Array, kinematics: Array) -> TrialRow:
     """Summarise one cell: samples (parts, rounds, problems) and kinematics, all [ns]."""
-    calls = samples[PARTS.index("whole")]
+    calls = samples[TIME_PARTS.index("whole")]
     timed = calls[~np.isnan(calls)] / 1e3
     if not len(timed):
         return {}
     own, core, wrapper = (
-        float(np.nanmedian(samples[PARTS.index(part)])) / 1e3 for part in ("own", "core", "wrapper")
+        float(np.nanmedian(samples[TIME_PARTS.index(part)])) / 1e3
+        for part in ("own", "core", "wrapper")
     )
     shared = float(np.median(kinematics)) / 1e3
     return {
@@ -184,7 +183,8 @@ def _summary(samples: Array, kinematics: Array) -> TrialRow:
         "formulation_time_p999_us": float(np.quantile(timed, 0.999)),
         "formulation_time_max_us": float(timed.max()),
         **{
-            f"missed_{rate}_hz_share": float(np.mean(timed + shared > 1e6 / rate)) for rate in RATES
+            f"missed_{rate}_hz_share": float(np.mean(timed + shared > 1e6 / rate))
+            for rate in CONTROL_RATES_HZ
         },
         "timing_samples": len(timed),
         "timing_stability": stability_of(calls),

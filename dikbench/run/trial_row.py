@@ -1,4 +1,4 @@
-"""What a worker process does: build a trial, run it, measure it."""
+"""The work of a worker process: build a trial, run it, measure it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dikbench.metrics import evaluate, motion_of
 from dikbench.plugins.building import make_formulation, make_plant, make_scenario
 from dikbench.problem.problem import program_of
 from dikbench.run.provenance import environment
-from dikbench.run.worker_process import calm_down
+from dikbench.run.worker_process import restore_process
 from dikbench.scenario.oracle import ORACLE
 from dikbench.scenario.scenario import Scenario
 from dikbench.selector import Selector
@@ -27,18 +27,18 @@ from dikbench.solvers.checked_solve import CheckedSolve, make_solve
 from dikbench.study.trial import NO_SOLVER, Trial
 
 TrialRow = dict[str, Any]
-"""One trial as it stands in the table: column -> value."""
+"""The row of a trial: column -> value."""
 
 TracePolicy = Literal["all", "failures", "none"]
 
 
 class CannotStore(DikbenchError):
-    """A trace cannot be written: the run has to end, with what is committed."""
+    """A trace cannot be written, which ends the run; committed rows are kept."""
 
 
 @lru_cache(maxsize=32)
 def scenario_of(selector: Selector, seed: int) -> Scenario:
-    """The scenario of a trial, built once per process."""
+    """Return the scenario of a trial, built once per process."""
     return make_scenario(selector, seed)
 
 
@@ -50,7 +50,7 @@ def solve_of(formulation: Selector, solver: Selector, *, checks: bool = True) ->
 
 
 def row_without_run(trial: Trial, status: Status, message: str) -> TrialRow:
-    """The row of a trial of which nothing can be measured."""
+    """Make the row of a trial of which nothing can be measured."""
     return {**trial.row, "status": status.value, "message": message, "steps": 0}
 
 
@@ -62,7 +62,7 @@ def _environment(commit: str | None, command: str) -> TrialRow:
 def work(
     trial: Trial, trace: Path, policy: TracePolicy, commit: str | None, command: str
 ) -> tuple[TrialRow, TrialRow]:
-    """Run a trial in a worker process, whatever its plug-ins do.
+    """Run a trial in a worker process; any failure of its plug-ins becomes a status.
 
     Args:
         trial: the cell.
@@ -77,7 +77,7 @@ def work(
     Raises:
         CannotStore: if the trace cannot be written.
     """
-    calm_down()
+    restore_process()
     try:
         row = run_trial(trial, trace, policy)
     except CannotStore:
@@ -90,7 +90,7 @@ def work(
     except BaseException as error:  # such as SystemExit
         reason = f"the formulation asked the process to end: {type(error).__name__}"
         row = row_without_run(trial, Status.CRASHED, reason)
-    calm_down()
+    restore_process()
     return row, _environment(commit, command)
 
 
@@ -100,11 +100,11 @@ def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "al
     Args:
         trial: the cell.
         trace: file for its trace, or None.
-        policy: whether it is kept.
+        policy: whether the trace is kept.
 
     Returns:
         Its row: keys, status, message, number of steps, every metric; `wall_time_s` of the run and
-        of it `control_time_s`, in kinematics, formulation and solver (the rest is the harness's).
+        `control_time_s` in kinematics, formulation and solver.
 
     Raises:
         CannotStore: if the trace cannot be written.
@@ -137,7 +137,9 @@ def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "al
         _keep(run.trace.save, trace)
     metrics: Mapping[str, float] = {}
     if run.trace.steps:
-        seen = None if plant.noise else run.jacobians  # with noise, not those of the true motion
+        seen = (
+            None if plant.noise else run.jacobians
+        )  # noise makes them differ from the true motion's
         metrics = evaluate(motion_of(run.trace, scenario, seen))
     return {
         **trial.row,
@@ -151,7 +153,7 @@ def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "al
 
 
 def _keep(save: Any, path: Path) -> None:
-    """Write a trace in one move."""
+    """Write a trace and move it into place."""
     partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
     try:
         save(partial)

@@ -1,7 +1,7 @@
-"""A closed-loop case, and all that the author of a family imports.
+"""A closed-loop case: everything that the author of a family imports.
 
-Robots, references, tasks and constraints to build a scenario from; the exact joint motion on which
-its certificate is measured; what a seed perturbs.
+These are robots, references, tasks and constraints of which a scenario is built, the exact joint
+motion on which its certificate is measured, and the perturbation by a seed.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What families are built from: limits in force, the start of a run, motions, usual claims.
+"""Parts of families: limits in force, the start of a run, motions, usual claims.
 
 Placements are `pinocchio.SE3`, configurations (nq,), joint velocities (nv,) [rad/s or m/s], times
 in seconds; a configuration that depends on time is a function tau [s] -> q.
@@ -27,15 +27,15 @@ JointMotion = tuple[Callable[[float], Array], Callable[[float], Array]]
 """tau [s] -> configuration (nq,), and tau -> its derivative (nv,) [rad/s or m/s]."""
 
 POSTURE_WEIGHT = 1e-4
-"""Weight of the secondary posture task: strong enough to choose a posture in the null space, weak
-enough not to be seen in the pose."""
+"""Weight of the secondary posture task: large enough to choose a posture in the null space, too
+small to affect the pose visibly."""
 
 
 def limits_in_force(robot: Robot, *, acceleration: bool) -> Robot:
-    """The robot with its acceleration limits in force, or without.
+    """Return the robot with its acceleration limits in force, or without.
 
     Raises:
-        DikbenchError: if they are wanted and none are known for this robot.
+        DikbenchError: if `acceleration` is set and none are known for this robot.
     """
     if not acceleration:
         return robot.with_limits(acceleration=None)
@@ -45,7 +45,7 @@ def limits_in_force(robot: Robot, *, acceleration: bool) -> Robot:
 
 
 def influence_distance(*, acceleration: bool) -> float:
-    """Distance [m] from which a collision is looked out for: farther where joints brake slowly."""
+    """Return the distance [m] below which a collision pair has a row."""
     return 0.5 if acceleration else 0.1
 
 
@@ -61,11 +61,11 @@ def secondary_tasks(
 def start_velocity(
     robot: Robot, reference: Reference, q0: Array, tracking: TrackingTask = POSE
 ) -> Array:
-    """The joint velocity (nv,) that follows the reference at its beginning, inside the limits."""
+    """Compute the joint velocity (nv,) at the reference's beginning, scaled into the limits."""
     kinematics = Kinematics(robot)
     kinematics.update(q0)
     twist = pin.Motion(reference.velocity(0.0))
-    # Only the reference's own velocity: where the start is off the path, the error is not.
+    # The difference is the reference's own velocity, without the error of a start off the path.
     still = tracking.linearize(kinematics, reference.placement(0.0))
     moving = tracking.linearize(kinematics, reference.placement(0.0), twist)
     v: Array = np.linalg.pinv(moving.J, rcond=1e-6) @ (moving.V - still.V)
@@ -76,18 +76,18 @@ def start_velocity(
 
 
 def placement_of(robot: Robot, q: Array) -> pin.SE3:
-    """Placement of the task frame at a configuration (nq,)."""
+    """Compute the placement of the task frame at a configuration (nq,)."""
     kinematics = Kinematics(robot)
     kinematics.update(q)
     return kinematics.placement(robot.frame_id).copy()
 
 
 def duration_at(robot: Robot, at_one_second: Reference, q0: Array, speed: float) -> float:
-    """How long a motion takes [s] whose exact joint motion peaks at `speed` times the limits.
+    """Compute the duration [s] for which the exact joint motion peaks at `speed` over limits.
 
     Args:
         robot: the robot, with velocity limits in force.
-        at_one_second: the motion, done in one second: joint speeds go with 1/duration.
+        at_one_second: the motion done in one second; joint speeds are proportional to 1/duration.
         q0: configuration at its beginning, (nq,).
         speed: peak of the joint speeds over their limits.
     """
@@ -96,10 +96,10 @@ def duration_at(robot: Robot, at_one_second: Reference, q0: Array, speed: float)
 
 
 def least_norm_share(robot: Robot, q: Array, joint: int, tracking: TrackingTask = POSE) -> float:
-    """The smallest share of a joint in the least-norm velocity that does what it does alone.
+    """Compute the smallest share of a joint in the least-norm velocity for its own effect.
 
-    The entry (joint, joint) of J^+ J, at configurations q (k, nq): 1 where no other velocity does
-    it, less where the arm's null space has a part of it.
+    It is the entry (joint, joint) of J^+ J at configurations q (k, nq): 1 where no other joint
+    velocity has this effect, less where the null space contains a part of it.
     """
     kinematics, rows, shares = Kinematics(robot), np.array(tracking.rows(robot)), []
     for sample in q:
@@ -110,9 +110,9 @@ def least_norm_share(robot: Robot, q: Array, joint: int, tracking: TrackingTask 
 
 
 def samples(duration: float, dt: float, most: int = 200) -> Array:
-    """Instants (k + 1,) [s] from end to end at which a certificate is measured.
+    """Return the instants (k + 1,) [s] from end to end at which a certificate is measured.
 
-    Every control step, or `most` of them where there are more.
+    They are the control steps, or `most` intervals where there are more.
     """
     return np.linspace(0.0, duration, min(most, max(2, steps_in(duration, dt))) + 1)
 
@@ -124,13 +124,13 @@ def usual_claims(
     sigma_min: float | None = None,
     margin: float | None = None,
 ) -> tuple[Claim, ...]:
-    """Claim what most certificates say of the exact motion; what is None is left out.
+    """Make the usual claims about the exact motion; what is None is left out.
 
     Args:
         motion: the exact joint motion.
-        speed: least and largest peak of the joint speeds over their limits.
-        sigma_min: least smallest singular value of the task Jacobian (m, rad).
-        margin: least distance to a position limit [rad].
+        speed: bounds on the peak of the joint speeds over their limits.
+        sigma_min: lower bound on the smallest singular value of the task Jacobian (m, rad).
+        margin: lower bound on the distance to a position limit [rad].
     """
     claims = []
     if speed is not None:
@@ -143,29 +143,29 @@ def usual_claims(
     return tuple(claims)
 
 
-def there_and_back(robot: Robot, start: Array, way: Array, duration: float) -> JointMotion:
-    """The joint motion q(t) = start + sin^2(pi t/T) way, with its derivative.
+def there_and_back(robot: Robot, start: Array, offset: Array, duration: float) -> JointMotion:
+    """Build the joint motion q(t) = start + sin^2(pi t/T) offset, with its derivative.
 
     Args:
         robot: the robot.
         start: configuration at both ends, (nq,).
-        way: from the start to half way, (nv,) [rad or m].
+        offset: from the start to the middle of the motion, (nv,) [rad or m].
         duration: T [s].
     """
 
     def q(tau: float) -> Array:
-        moved: Array = pin.integrate(robot.model, start, np.sin(pi * tau / duration) ** 2 * way)
+        moved: Array = pin.integrate(robot.model, start, np.sin(pi * tau / duration) ** 2 * offset)
         return moved
 
     def v(tau: float) -> Array:
-        rate: Array = pi / duration * np.sin(2 * pi * tau / duration) * way
+        rate: Array = pi / duration * np.sin(2 * pi * tau / duration) * offset
         return rate
 
     return q, v
 
 
 def at_constant_rate(robot: Robot, start: Array, rate: Array) -> JointMotion:
-    """The joint motion q(t) = start + t rate, with its derivative.
+    """Build the joint motion q(t) = start + t rate, with its derivative.
 
     Args:
         robot: the robot.
@@ -181,15 +181,15 @@ def at_constant_rate(robot: Robot, start: Array, rate: Array) -> JointMotion:
 
 
 def motion_of_a_step(robot: Robot, q0: Array, twist: Array, gain: float) -> OracleMotion:
-    """Measure the motion that a proportional law asks for after a step of the target.
+    """Measure the motion that a proportional controller requires after a step of the target.
 
-    It goes straight, along the screw, at first at gain times the distance, and there in 1/gain.
+    It moves along the screw at gain times the distance, for the time 1/gain.
 
     Args:
         robot: the robot.
         q0: configuration at the start, (nq,).
         twist: the body twist (6,) that leads from the start to the target in one second.
-        gain: of the tracking task [1/s].
+        gain: gain of the tracking task [1/s].
     """
     start = placement_of(robot, q0)
     straight = Reference(
@@ -201,7 +201,7 @@ def motion_of_a_step(robot: Robot, q0: Array, twist: Array, gain: float) -> Orac
 
 
 def step_claims(motion: OracleMotion) -> tuple[Claim, Claim]:
-    """Claim that the motion after a step (see `motion_of_a_step`) meets nothing on its way."""
+    """Claim that the motion after a step meets no limit and no singularity."""
     return (
         Claim("smallest singular value on the way", motion.sigma_min.min(), at_least=0.03),
         Claim("position margin on the way [rad]", motion.margin.min(), at_least=0.05),
@@ -211,13 +211,13 @@ def step_claims(motion: OracleMotion) -> tuple[Claim, Claim]:
 def collision_claims(
     motion: OracleMotion, distance: Array, margin: float, *, depth: float, speed: float
 ) -> tuple[Claim, ...]:
-    """Claim that a motion goes into something, comes back, and is about nothing else.
+    """Claim that a motion enters an obstacle and returns, away from limits and singularities.
 
     Args:
         motion: the exact joint motion.
-        distance: the least distance at each of its samples, (k + 1,) [m], negative inside.
-        margin: distance that is to be kept [m].
-        depth: how far inside the motion goes at least [m].
+        distance: the smallest distance at each of its samples, (k + 1,) [m], negative inside.
+        margin: distance to keep [m].
+        depth: smallest depth that the motion reaches inside [m].
         speed: peak of the joint speeds over their limits.
     """
     return (
@@ -233,7 +233,7 @@ def check_can_lift(robot: Robot, certified: tuple[str, ...]) -> None:
     """Check that an arm can lift.
 
     Raises:
-        DikbenchError: if it moves in a plane; the message lists the `certified` ones.
+        DikbenchError: if it moves in a plane; the message lists the `certified` robots.
     """
     if 2 not in robot.task_rows:
         raise DikbenchError(

@@ -1,4 +1,4 @@
-"""Certificates: what makes a scenario hard, measured on its reference and asserted."""
+"""Certificates: claims about a scenario's difficulty, measured on its reference and checked."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from dikbench.errors import DikbenchError
 
 @dataclass(frozen=True)
 class Claim:
-    """A measured property of a scenario and the range in which it must lie.
+    """A measured quantity of a scenario and the range in which it must lie.
 
     Attributes:
         quantity: what was measured, with its unit.
-        value: what came out.
-        at_least, at_most: the range that makes the scenario what it says it is.
+        value: the measured value.
+        at_least, at_most: the range of the value.
     """
 
     quantity: str
@@ -28,10 +28,30 @@ class Claim:
         return self.at_least <= self.value <= self.at_most
 
     def __str__(self) -> str:
-        """The claim in words."""
+        """Write the claim as an inequality."""
         low = f"{self.at_least:.4g} <= " if self.at_least > -float("inf") else ""
         high = f" <= {self.at_most:.4g}" if self.at_most < float("inf") else ""
         return f"{low}{self.quantity} = {self.value:.4g}{high}"
+
+    @property
+    def failure(self) -> str:
+        """The value and the range in which it should be."""
+        low = f">= {self.at_least:.4g}" if self.at_least > -float("inf") else ""
+        high = f"<= {self.at_most:.4g}" if self.at_most < float("inf") else ""
+        valid = " and ".join(filter(None, (low, high))) or "a number"
+        return f"{self.quantity} = {self.value:.4g}, must be {valid}"
+
+
+class CertificateFailed(DikbenchError):
+    """A scenario is not what it claims to be.
+
+    Attributes:
+        failures: the claims that do not hold, with what would be valid.
+    """
+
+    def __init__(self, scenario: str, failures: str) -> None:
+        super().__init__(f"certificate of {scenario!r} failed: {failures}")
+        self.failures = failures
 
 
 @dataclass(frozen=True)
@@ -40,12 +60,12 @@ class Certificate:
 
     claims: tuple[Claim, ...]
 
-    def check(self) -> None:
-        """Assert every claim.
+    def check(self, scenario: str) -> None:
+        """Check every claim; the scenario's name is for the message.
 
         Raises:
-            DikbenchError: if one does not hold: the scenario would test something else.
+            CertificateFailed: if a claim does not hold: the scenario would test something else.
         """
-        for claim in self.claims:
-            if not claim.holds:
-                raise DikbenchError(f"certificate failed: {claim} is false")
+        failures = [claim.failure for claim in self.claims if not claim.holds]
+        if failures:
+            raise CertificateFailed(scenario, "; ".join(failures))

@@ -25,27 +25,27 @@ from dikbench.scenario.scenario import Judged, Scenario, first_level
 from dikbench.scenario.variation import NO_VARIATION, Perturbation, Variation
 
 Gain = Annotated[float, Range(above=0.0, unit="1/s")]
-"""Of a task: the desired velocity per error."""
+"""The gain of a task, the desired velocity per error."""
 
 Time = Annotated[float, Range(above=0.0, unit="s")]
-"""A control period, or how long something lasts."""
+"""A control period or a duration."""
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """What is a family's own of a scenario; what is None is filled in by `Family.scenario`.
+    """The part of a scenario that its family makes; `Family.scenario` fills in what is None.
 
     Attributes:
         reference: the desired motion of the task frame.
         q0: configuration at the start, (nq,).
-        motion: the joint motion that follows the reference exactly; None where none does.
-        claims: what makes the scenario what it is.
+        motion: the joint motion that follows the reference exactly; None where there is none.
+        claims: the claims of its certificate.
         robot: the robot with its limits in force; default: the one that the case was made with.
         tracking: the task that follows the reference; default: the whole pose.
         v0: joint velocity at the start, (nv,) [rad/s or m/s]; default: the reference's own.
-        tasks: other tasks; default: to hold the posture q0 in the null space, where there is one.
+        tasks: other tasks; default: hold the posture q0 in the null space, where there is one.
         duration: length of a time-indexed run [s]; default: the reference's.
-        constraints: what must hold in addition to the joint limits.
+        constraints: conditions in addition to the joint limits.
     """
 
     reference: Reference
@@ -62,20 +62,21 @@ class Case:
 
 @dataclass(frozen=True, kw_only=True)
 class Family(Parameters, ABC):
-    """Scenarios that differ in parameters; a subclass adds its own and says what a case is.
+    """Scenarios that differ in parameters; a subclass adds parameters and defines `case`.
 
-    A field that a subclass gives one value only (`frame: None = None`) is fixed and hidden.
-    Paragraphs `Provokes: ...`, `Shows in: ...` and `Source: ...` of the docstring are listed.
+    A field to which a subclass gives one value only (`frame: None = None`) is fixed and hidden. The
+    paragraphs `Provokes: ...`, `Shows in: ...` and `Source: ...` of the docstring are shown in
+    lists.
 
     Attributes:
         robot: a robot's name, or the path of a URDF.
         frame: the task frame; default: the robot's.
-        gain: of the tracking task.
+        gain: gain of the tracking task.
         dt: control period.
         acceleration: whether acceleration limits are in force.
-        robots: on which the defaults are certified, where the family takes any.
-        variation: what a seed perturbs, and within which ranges.
-        grid: the two parameters, across and up, that span a phase diagram.
+        robots: robots on which the defaults are certified, where the family takes any robot.
+        variation: the ranges of what a seed perturbs.
+        grid: the two parameters of a phase diagram, horizontal and vertical.
         about_position_limits: whether figures show the distance to the position limits.
         tolerance_m, judged, longest_path_run: see `Scenario`.
     """
@@ -96,21 +97,22 @@ class Family(Parameters, ABC):
 
     @abstractmethod
     def case(self, robot: Robot, change: Perturbation) -> Case:
-        """Make what is the family's own of a scenario.
+        """Make the family's part of a scenario.
 
         Args:
             robot: the robot that `robot` and `frame` name, with its limits in force.
-            change: what the seed perturbs; seed 0 perturbs nothing.
+            change: the perturbation by the seed.
 
         Raises:
-            DikbenchError: if there is no such case; the message need not name the family.
+            DikbenchError: if there is no such case; the caller adds the family's name.
         """
 
     def scenario(self, seed: int = 0) -> Scenario:
-        """Make the scenario of a seed, and assert its certificate.
+        """Make the scenario of a seed and check its certificate.
 
         Raises:
-            DikbenchError: if there is none with these parameters, or a claim does not hold.
+            DikbenchError: if there is none with these parameters.
+            CertificateFailed: if a claim does not hold.
         """
         change = self.variation.drawn(seed)
         arm = limits_in_force(load_robot(self.robot, self.frame), acceleration=self.acceleration)
@@ -140,7 +142,7 @@ class Family(Parameters, ABC):
             judged=self.judged,
             longest_path_run=self.longest_path_run,
         )
-        made.certificate.check()
+        made.certificate.check(type(self).__name__)
         return made
 
     def exact_motion(
@@ -161,5 +163,5 @@ class Family(Parameters, ABC):
 
 
 def certified_robots(family: type[Family]) -> tuple[str, ...]:
-    """Robots on which a family's defaults are certified: those of its type, else its `robots`."""
+    """Return the robots on which a family's defaults are certified: those of its type, if any."""
     return parameters_of(family)["robot"].choices or family.robots

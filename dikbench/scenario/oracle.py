@@ -1,4 +1,4 @@
-"""The joint motion that follows a reference exactly, limits or not: the measure of scenarios."""
+"""The joint motion that follows a reference exactly, whatever the limits."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from dikbench.robots.robot import Robot
 from dikbench.scenario.reference.reference import Reference
 
 ORACLE = "oracle"
-"""What stands in the place of the law where the joint motion itself is scored."""
+"""The name of the formulation in rows that score this joint motion itself."""
 
 POSE = PoseTask()
 
 
 @dataclass(frozen=True, eq=False)
 class OracleMotion:
-    """A joint motion sampled along a reference, and what it asks of the robot.
+    """A joint motion sampled along a reference, and its demands on the robot.
 
     Attributes:
         instants: nominal times of the samples, (k + 1,) [s].
         q: configurations, (k + 1, nq).
-        v: velocities between them at nominal speed, (k, nv) [rad/s].
+        v: velocities between the samples at nominal speed, (k, nv) [rad/s].
         sigma_min: smallest singular value of the task Jacobian (m, rad), (k + 1,).
         speed_ratio: largest |v| over its limit, (k,).
         margin: smallest distance to a position limit [rad], negative outside, (k + 1,).
@@ -60,10 +60,10 @@ def solve_placement(
     tracking: TrackingTask = POSE,
     iterations: int = 200,
 ) -> Array:
-    """A configuration that does a tracking task, by damped Gauss-Newton from `seed`.
+    """Find a configuration that does a tracking task, by damped Gauss-Newton from `seed`.
 
-    Steps are Levenberg-Marquardt with damping by the squared error (Sugihara 2011), at most 0.3 rad
-    each; position limits are not looked at.
+    Steps are Levenberg-Marquardt with damping by the squared error (Sugihara 2011) of at most
+    0.3 rad; position limits are ignored.
 
     Args:
         robot: the robot.
@@ -84,7 +84,7 @@ def solve_placement(
         e, J = task.error, task.J
         before, error = error, float(np.linalg.norm(e))
         if error < 1e-12 or (error < 1e-9 and error >= before):
-            return q  # there, or as near as rounding lets it come
+            return q  # there, up to rounding
         H = J.T @ J
         H.flat[:: len(H) + 1] += 0.1 * error**2 + 1e-12
         step = np.linalg.solve(H, J.T @ e)
@@ -98,16 +98,16 @@ def solve_placement(
 def follow(
     robot: Robot, reference: Reference, q0: Array, instants: Array, tracking: TrackingTask = POSE
 ) -> Array:
-    """Configurations (k + 1, nq) that follow a reference exactly from q0 on.
+    """Compute configurations (k + 1, nq) that follow a reference exactly from q0 on.
 
-    Each is solved from the one before it, in the least-norm way where the arm has a null space.
+    Each is solved from the previous one, by least-norm steps where the arm has a null space.
 
     Args:
         robot: the robot.
         reference: the path.
         q0: configuration at the first instant, (nq,).
         instants: nominal times, (k + 1,) [s].
-        tracking: what is to be followed.
+        tracking: the task that follows the reference.
 
     Raises:
         DikbenchError: if a sample cannot be reached.
@@ -165,9 +165,9 @@ def measure_motion(
 
 
 def position_margin(robot: Robot, q: Array) -> float:
-    """Smallest distance [rad] of a configuration (nq,) to a position limit, negative outside.
+    """Compute the smallest distance [rad] of q (nq,) to a position limit, negative outside.
 
-    Of the joints that move the task frame.
+    Only joints that move the task frame count.
     """
     limits, chain = robot.limits.at(q), robot.chain
     if limits.to_lower is None or limits.to_upper is None:

@@ -1,4 +1,4 @@
-"""Plants: what a robot makes of a commanded velocity, and what a formulation sees of it."""
+"""Plants: what a robot applies of a commanded velocity, and how its configuration is measured."""
 
 from __future__ import annotations
 
@@ -17,33 +17,32 @@ from dikbench.parameters import Parameters, Range
 from dikbench.robots.limits import Limits
 from dikbench.scenario.scenario import Scenario
 
-LONGEST_DELAY: Final = 1000
-"""Control steps; with a longer delay there is no loop to close."""
+LONGEST_DELAY_STEPS: Final = 1000
 
 NOISE_STREAM: Final = 3
-"""Separates the noise from what the same seed draws of the scenario."""
+"""Number of the random stream of the noise, which differs from those of a seed's scenario."""
 
 
 @dataclass(frozen=True)
 class Plant(Parameters, ABC):
-    """A drive behind a measurement and a line of communication.
+    """A drive with a noisy measurement and delayed commands.
 
     Attributes:
-        noise: standard deviation of the configuration that the formulation sees about the true
-            one, per joint and step [rad or m]; white and normal, drawn from the trial's seed.
-        delay: control steps by which a command arrives late; until the first one does, the robot
-            keeps the velocity that it has at the start.
+        noise: standard deviation of the measured configuration about the true one, per joint and
+            step [rad or m]; white and normal, drawn from the trial's seed.
+        delay: control steps by which a command arrives late; until the first one arrives the
+            robot keeps its velocity at the start.
     """
 
     noise: Annotated[float, Range(0.0, unit="rad or m")] = 0.0
-    delay: Annotated[int, Range(0, LONGEST_DELAY, "steps")] = 0
+    delay: Annotated[int, Range(0, LONGEST_DELAY_STEPS, "steps")] = 0
 
     @abstractmethod
     def drive(self, v: Array, limits: Limits, dt: float) -> Array:
-        """Compute what is applied of a command that arrived.
+        """Compute the velocity that is applied of a command that arrived.
 
         Args:
-            v: the command, (nv,) [rad/s or m/s]; not to be written to.
+            v: the command, (nv,) [rad/s or m/s], read-only.
             limits: the limits in force, as seen from the true configuration.
             dt: control period [s].
         """
@@ -54,20 +53,21 @@ class Plant(Parameters, ABC):
 
 
 class StartedPlant:
-    """A plant in one trial: its random numbers and the commands that are under way."""
+    """A plant in one trial: its random numbers and the commands that have not arrived."""
 
-    __slots__ = ("_arriving", "_dt", "_model", "_plant", "_random")
+    __slots__ = ("_arriving", "_drive", "_dt", "_model", "_noise", "_random")
 
     def __init__(self, plant: Plant, scenario: Scenario, seed: int) -> None:
-        self._plant, self._model, self._dt = plant, scenario.robot.model, scenario.dt
+        self._drive, self._noise = plant.drive, plant.noise
+        self._model, self._dt = scenario.robot.model, scenario.dt
         self._random = np.random.default_rng([seed, NOISE_STREAM])
         self._arriving = deque([read_only(scenario.v0.copy())] * plant.delay)
 
     def seen(self, q: Array) -> Array:
         """Measure the true configuration, (nq,); without noise the result is `q` itself."""
-        if not self._plant.noise:
+        if not self._noise:
             return q
-        error = self._random.normal(0.0, self._plant.noise, self._model.nv)
+        error = self._random.normal(0.0, self._noise, self._model.nv)
         return read_only(pin.integrate(self._model, q, error))
 
     def apply(self, v: Array, limits: Limits) -> Array:
@@ -81,12 +81,14 @@ class StartedPlant:
             The velocity (nv,) with which the robot moves during this step, read-only.
         """
         self._arriving.append(v)
-        return read_only(self._plant.drive(self._arriving.popleft(), limits, self._dt))
+        arrived = self._arriving.popleft()
+        applied = self._drive(arrived, limits, self._dt)
+        return applied if applied is arrived else read_only(applied)
 
 
 @dataclass(frozen=True)
 class Ideal(Plant):
-    """Applies whatever is commanded, limits or not: shows violations."""
+    """Applies the command, limits or not, which shows violations."""
 
     def drive(self, v: Array, limits: Limits, dt: float) -> Array:
         """Return the command (see `Plant.drive`)."""
@@ -95,7 +97,7 @@ class Ideal(Plant):
 
 @dataclass(frozen=True)
 class Saturating(Plant):
-    """Clips each joint to its velocity and position limits: shows going off course."""
+    """Clips each joint to its velocity and position limits, which shows direction errors."""
 
     def drive(self, v: Array, limits: Limits, dt: float) -> Array:
         """Clip the command (see `Plant.drive`)."""
@@ -103,7 +105,7 @@ class Saturating(Plant):
         if velocity is not None:
             v = np.clip(v, velocity.lower, velocity.upper)
         if limits.to_lower is not None and limits.to_upper is not None:
-            # A joint that is outside already may not go further out, and is not thrown back.
+            # A joint that is outside may not move further out, and is not moved back either.
             lower, upper = np.maximum(limits.to_lower, 0), np.maximum(limits.to_upper, 0)
             v = np.clip(v, -lower / dt, upper / dt)
         return v

@@ -28,7 +28,7 @@ Judged = Literal["path", "end"]
 
 
 def first_level(tracking: TrackingTask, tasks: tuple[Task, ...]) -> TrackingTask:
-    """Join the tracking with those of the other tasks that are of its priority."""
+    """Stack the tracking task with the other tasks of its priority."""
     equal = tuple(task for task in tasks if task.priority == tracking.priority)
     return TrackingTogether(tracking, equal) if equal else tracking
 
@@ -42,21 +42,21 @@ class Scenario:
         q0: start configuration, (nq,).
         v0: joint velocity at the start, (nv,) [rad/s]: the reference's own, so that a run does not
             begin with a jump from rest.
-        reference: what the task frame should do.
-        tracking: the task that follows it: pose, position only or orientation only, with its gain.
+        reference: the desired motion of the task frame.
+        tracking: the task that follows it: pose, position or orientation.
         dt: control period [s].
         duration: length of a time-indexed run [s].
-        certificate: what makes the scenario what it is.
-        tasks: other tasks than the tracking of the reference: below it, or of its priority.
+        certificate: the claims about its difficulty.
+        tasks: other tasks, of lower or the same priority.
         motion: the joint motion from which the path was built, on which the certificate was
             measured, from q0 on; None where no joint motion follows the reference.
-        variation: what a seed perturbs.
-        constraints: what must hold beside the limits of the joints.
-        tolerance_m: distance from the path, and from the target at the end, at which the task
+        variation: the ranges of what a seed perturbs.
+        constraints: conditions in addition to the joint limits.
+        tolerance_m: distance from the path, and from the target at the end, up to which the task
             counts as done [m] (see `Embedding`).
-        judged: whether the way to the end counts, or the end alone.
-        longest_path_run: a path-indexed run ends with its path, or after this many times its
-            nominal duration.
+        judged: whether the whole path is judged, or the end alone.
+        longest_path_run: nominal durations after which a path-indexed run ends, if not with its
+            path before.
     """
 
     robot: Robot
@@ -76,7 +76,7 @@ class Scenario:
     longest_path_run: float = 5.0
 
     def __post_init__(self) -> None:
-        """Check that a run ends (see `steps_in`)."""
+        """Check the number of control steps (see `steps_in`)."""
         steps_in(self.duration, self.dt)
 
     @cached_property
@@ -91,19 +91,19 @@ class Scenario:
 
     @cached_property
     def first(self) -> TrackingTask:
-        """The tracking, together with what is of the same priority."""
+        """The tracking task stacked with the tasks of its priority."""
         return first_level(self.tracking, self.tasks)
 
     @cached_property
     def targets(self) -> list[tuple[Any, Any]]:
         """Placement and body twist of the reference before each step and after the last.
 
-        Those of a time-indexed run, the same for every law: `pinocchio.SE3`, `pinocchio.Motion`.
+        They are those of a time-indexed run: `pinocchio.SE3` and `pinocchio.Motion`.
         """
         return [self.target(k * self.dt) for k in range(self.steps + 1)]
 
     def target(self, tau: float) -> tuple[Any, Any]:
-        """Placement and body twist of the reference at a nominal time [s]."""
+        """Compute placement and body twist of the reference at a nominal time [s]."""
         return self.reference.placement(tau), pin.Motion(self.reference.velocity(tau))
 
     @cached_property
@@ -114,7 +114,7 @@ class Scenario:
 
     @cached_property
     def path(self) -> ReferencePath | None:
-        """The path of the reference, as far as any run goes; None for a target at rest."""
+        """The path of the reference, to the end of any run; None for a target at rest."""
         if not self.reference.moving:
             return None
         end = max(self.reference.duration, self.steps * self.dt)
@@ -140,9 +140,7 @@ class Scenario:
 
     @cached_property
     def oracle(self) -> Array | None:
-        """The joint motion that does the task exactly, at every control step, (n + 1, nq).
-
-        None where there is none.
+        """The exact joint motion at every control step, (n + 1, nq); None where there is none.
 
         Raises:
             DikbenchError: if it cannot be followed at this control period.

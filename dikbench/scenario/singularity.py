@@ -1,4 +1,4 @@
-"""Singular postures of any arm: found, made exact, and told apart."""
+"""Singular postures of any arm: finding them, making them exact, distinguishing their kinds."""
 
 from __future__ import annotations
 
@@ -15,32 +15,32 @@ from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.robot import Robot
 from dikbench.scenario.oracle import position_margin
 
-STEP: Final = 1e-5
-"""Of central differences of the Jacobian [rad]: their error is about its square."""
+STEP_RAD: Final = 1e-5
+"""Step of central differences of the Jacobian, whose error is about its square."""
 
-EXACT: Final = 1e-10
-"""A smallest singular value (m, rad) below this is zero."""
+ZERO_SINGULAR_VALUE: Final = 1e-10
+"""Smaller singular values (m, rad) count as zero."""
 
-FLAT: Final = 1e-6
-"""A curvature (m/rad^2, rad/rad^2) below this is none."""
+ZERO_CURVATURE: Final = 1e-6
+"""Smaller curvatures (m/rad^2, rad/rad^2) count as zero."""
 
 Kind = Literal["crossing", "fold", "saddle"]
 
 
 @dataclass(frozen=True, eq=False)
 class Singularity:
-    """A singular posture and what it does to the motion of the task frame.
+    """A singular posture and its effect on the motion of the task frame.
 
     With J = U S V^T the body Jacobian (m, rad) at q, n = u_m is the unit twist that no joint
-    velocity makes, Z the joint velocities that move nothing (J Z = 0). Moving along z in Z makes,
-    to second order, the twist n (z^T Q z)/2 with Q_ij = n^T dJ[z_i] z_j.
+    velocity gives, and Z spans the null space, J Z = 0. A motion along z in Z gives, to second
+    order, the twist n (z^T Q z)/2 with Q_ij = n^T dJ[z_i] z_j.
 
-    - Q = 0, a crossing: nothing in Z helps along n. The arm can move through, by a joint that makes
-      the smallest singular value grow; passing at a distance costs speed as 1/distance.
+    - Q = 0, a crossing: no motion in Z gives n. The arm can move through it by a joint along which
+      the smallest singular value grows; passing at a distance takes speeds of 1/distance.
     - Q definite or semidefinite, a fold: the edge of what can be reached, n leads to one side only;
-      coming near it costs speed as 1/sqrt(distance).
-    - Q indefinite, a saddle (only on redundant arms): n leads to both sides, each at the price of a
-      fold.
+      approaching it takes speeds of 1/sqrt(distance).
+    - Q indefinite, a saddle (only on redundant arms): n leads to both sides, with the speeds
+      of a fold.
 
     Attributes:
         q: the posture, (nq,).
@@ -65,9 +65,9 @@ class Singularity:
     growth: Array
 
     def oriented_like(self, other: Singularity) -> Singularity:
-        """The same, `lost` and `bend` with the signs that a posture nearby has.
+        """Return the same singularity, `lost` and `bend` with the signs of a nearby posture.
 
-        The signs of singular vectors mean nothing, and may change from one posture to the next.
+        The signs of singular vectors are arbitrary and may change from one posture to the next.
         """
         turned = float(np.sign(self.lost @ other.lost)) or 1.0
         bent = float(np.sign(self.bend @ other.bend)) or 1.0
@@ -77,7 +77,7 @@ class Singularity:
 
 
 def analyse(robot: Robot, q: Array) -> Singularity:
-    """What kind of singularity an exactly singular posture (nq,) is.
+    """Determine what kind of singularity an exactly singular posture (nq,) is.
 
     Raises:
         DikbenchError: if the posture is not singular, or loses more than one direction.
@@ -88,7 +88,7 @@ def analyse(robot: Robot, q: Array) -> Singularity:
     placement = kinematics.placement(robot.frame_id).copy()
     U, singular, Vt = np.linalg.svd(J)
     m = len(rows)
-    if singular[m - 1] > 1e3 * EXACT or singular[m - 2] < 1e-4:
+    if singular[m - 1] > 1e3 * ZERO_SINGULAR_VALUE or singular[m - 2] < 1e-4:
         raise DikbenchError(
             f"robot {robot.name}: the posture does not lose exactly one direction, its smallest "
             f"singular values are {singular[m - 2]:.2g} and {singular[m - 1]:.2g}"
@@ -103,9 +103,9 @@ def analyse(robot: Robot, q: Array) -> Singularity:
     curvatures, directions = np.linalg.eigh(Q)
     strongest = int(np.argmax(np.abs(curvatures)))
     kind: Kind = "saddle"
-    if abs(curvatures[strongest]) < FLAT:
+    if abs(curvatures[strongest]) < ZERO_CURVATURE:
         kind = "crossing"
-    elif curvatures.min() > -FLAT or curvatures.max() < FLAT:
+    elif curvatures.min() > -ZERO_CURVATURE or curvatures.max() < ZERO_CURVATURE:
         kind = "fold"
     lost = np.zeros(6)
     lost[rows] = n
@@ -123,18 +123,18 @@ def analyse(robot: Robot, q: Array) -> Singularity:
 
 
 def make_singular(robot: Robot, seed: Array, *, fixed: tuple[int, ...] = ()) -> Array:
-    """The exactly singular posture (nq,) next to a seed (nq,), by Gauss-Newton.
+    """Find the exactly singular posture (nq,) next to a seed (nq,), by Gauss-Newton.
 
-    Solves J(q)^T u = 0, ||u|| = 1 for the posture and its lost twist u together, from u_m of the
-    seed on, in least-norm steps of at most 0.2 rad.
+    It solves J(q)^T u = 0, ||u|| = 1 for the posture and its lost twist u together, starting from
+    u_m of the seed, in least-norm steps of at most 0.2 rad.
 
     Args:
         robot: the robot.
-        seed: where to start.
-        fixed: joints (indices into v) that stay as they are.
+        seed: configuration to start from, (nq,).
+        fixed: joints (indices into v) that do not move.
 
     Raises:
-        DikbenchError: if the smallest singular value does not come to zero.
+        DikbenchError: if the smallest singular value does not converge to zero.
     """
     rows, nv = np.array(robot.task_rows), robot.nv
     m = len(rows)
@@ -147,7 +147,7 @@ def make_singular(robot: Robot, seed: Array, *, fixed: tuple[int, ...] = ()) -> 
         J = kinematics.jacobian(robot.frame_id)[rows]
         U, singular, _ = np.linalg.svd(J)
         u, sigma = U[:, -1], float(singular[m - 1])
-        if sigma < EXACT:
+        if sigma < ZERO_SINGULAR_VALUE:
             return q
         A = np.zeros((nv + 1, len(free) + m))
         A[:nv, : len(free)] = np.einsum("i,kij->jk", u, _jacobian_derivatives(robot, q)[free])
@@ -163,12 +163,12 @@ def make_singular(robot: Robot, seed: Array, *, fixed: tuple[int, ...] = ()) -> 
 
 
 def singular_postures(robot: Robot, margin: float, attempts: int = 24) -> Iterator[Array]:
-    """Singular postures (nq,) inside the position limits, from the robot's start outwards.
+    """Yield singular postures (nq,) inside the position limits, near the robot's start first.
 
     Args:
         robot: the robot.
         margin: least distance to each position limit [rad].
-        attempts: number of seeds: the start, then ever farther from it, always the same ones.
+        attempts: number of seeds, which are the same in every call: the start, then farther ones.
     """
     random = np.random.default_rng(0)
     for attempt in range(attempts):
@@ -183,13 +183,13 @@ def singular_postures(robot: Robot, margin: float, attempts: int = 24) -> Iterat
 
 
 def _jacobian_derivatives(robot: Robot, q: Array) -> Array:
-    """dJ/dq_k of the rows that the arm can move, by central differences, (nv, m, nv)."""
+    """Compute dJ/dq_k of the rows that the arm can move, by central differences, (nv, m, nv)."""
     rows, nv = np.array(robot.task_rows), robot.nv
     kinematics, unit = Kinematics(robot), np.eye(nv)
     derivatives = np.empty((nv, len(rows), nv))
     for k in range(nv):
-        kinematics.update(pin.integrate(robot.model, q, STEP * unit[k]))
+        kinematics.update(pin.integrate(robot.model, q, STEP_RAD * unit[k]))
         ahead = kinematics.jacobian(robot.frame_id)[rows].copy()
-        kinematics.update(pin.integrate(robot.model, q, -STEP * unit[k]))
-        derivatives[k] = (ahead - kinematics.jacobian(robot.frame_id)[rows]) / (2 * STEP)
+        kinematics.update(pin.integrate(robot.model, q, -STEP_RAD * unit[k]))
+        derivatives[k] = (ahead - kinematics.jacobian(robot.frame_id)[rows]) / (2 * STEP_RAD)
     return derivatives

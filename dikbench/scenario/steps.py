@@ -1,4 +1,4 @@
-"""How many control steps a duration has."""
+"""The number of control steps of a duration."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from typing import Final
 from dikbench.errors import DikbenchError
 
 MOST_STEPS: Final = 100_000
-"""A run that is longer would not end in anybody's patience."""
+"""Largest number of control steps of a run."""
 
 
 def steps_in(duration: float, dt: float) -> int:
-    """Number of control steps of dt [s] in a duration [s], at least one.
+    """Compute the number of control steps of dt [s] in a duration [s], at least one.
 
     Raises:
-        DikbenchError: if there are too many, or the duration is shorter than half a step.
+        DikbenchError: if there are more than `MOST_STEPS`, or less than half a step.
     """
     if not 0.5 <= duration / dt <= MOST_STEPS:
         raise DikbenchError(

@@ -1,4 +1,4 @@
-"""What a seed may change of a scenario, and within which ranges; seed 0 changes nothing."""
+"""The perturbation of a scenario by a seed, within declared ranges; seed 0 perturbs nothing."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ class Variation:
     """The ranges, declared by a family, within which a seed perturbs its scenarios.
 
     Attributes:
-        start: each joint of the posture from which the motion is built is moved by at most this
+        start: largest displacement of each joint of the posture from which the motion is built
             [rad or m].
-        direction: the direction of the motion is turned by at most this [rad].
-        timing: the motion's duration is changed by at most this share.
+        direction: largest rotation of the direction of the motion [rad].
+        timing: largest change of the motion's duration, as a share of it.
     """
 
     start: float = 0.0
@@ -30,17 +30,17 @@ class Variation:
     timing: float = 0.0
 
     def drawn(self, seed: int) -> Perturbation:
-        """What this seed changes.
+        """Draw what this seed changes.
 
         Raises:
             DikbenchError: on a negative seed.
         """
         if seed < 0:
-            raise DikbenchError(f"seed {seed} must not be negative")
+            raise DikbenchError(f"seed {seed} must be at least 0")
         return Perturbation(self, seed)
 
     def __str__(self) -> str:
-        """The ranges in words."""
+        """Write the ranges in words."""
         parts = [
             f"start by up to {self.start:.3g} rad per joint" if self.start else "",
             f"direction by up to {self.direction:.3g} rad" if self.direction else "",
@@ -50,12 +50,12 @@ class Variation:
 
 
 NO_VARIATION: Final = Variation()
-"""Of a family in which a seed changes nothing."""
+"""The variation of a family in which a seed changes nothing."""
 
 
 @dataclass(frozen=True)
 class Perturbation:
-    """What one seed changes; uniform within the declared ranges, each part drawn by itself.
+    """The perturbation by one seed; each part is drawn independently, uniform in its range.
 
     Attributes:
         ranges: the ranges.
@@ -66,7 +66,7 @@ class Perturbation:
     seed: int
 
     def posture(self, robot: Robot, q: Array, fixed: tuple[int, ...] = ()) -> Array:
-        """A configuration (nq,) with its joints moved, but those (indices into v) in `fixed`."""
+        """Move the joints of a configuration (nq,), except those (indices into v) in `fixed`."""
         if self.seed == 0 or self.ranges.start == 0:
             return q
         step = self._random(0).uniform(-self.ranges.start, self.ranges.start, robot.nv)
@@ -75,7 +75,7 @@ class Perturbation:
         return moved
 
     def rotation(self, robot: Robot) -> Array:
-        """A rotation (3, 3) by which directions are turned; a planar arm keeps to its plane."""
+        """Draw a rotation (3, 3) of directions; a planar arm keeps to its plane."""
         if self.seed == 0 or self.ranges.direction == 0:
             return np.eye(3)
         random = self._random(1)
@@ -88,7 +88,7 @@ class Perturbation:
 
     @cached_property
     def pace(self) -> float:
-        """The factor by which the motion's duration is longer."""
+        """The factor on the motion's duration."""
         if self.seed == 0 or self.ranges.timing == 0:
             return 1.0
         return 1.0 + float(self._random(2).uniform(-self.ranges.timing, self.ranges.timing))

@@ -1,1 +1,1 @@
-"""The closed loop, one control step of it, and what is recorded."""
+"""The closed loop, one control step of it, and its record."""

@@ -1,8 +1,8 @@
-"""Clocks: how a reference moves on during a trial, with time or with the robot."""
+"""Clocks: how a reference advances during a trial, with time or with the robot."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, Final, Literal, Protocol
 
@@ -14,18 +14,21 @@ from dikbench.scenario.scenario import Scenario
 ReferenceMode = Literal["time", "path"]
 
 LOOK_BACK_S: Final = 0.1
-"""The nearest point of the path is looked for from so long before the target on [s]."""
+"""Nominal time before the target from which on the nearest point of the path is searched."""
 
 PATH_END_TOLERANCE: Final = 1e-9
-"""A path has ended when at most this share of it is left."""
+"""Remaining share of a path at which it has ended."""
 
 
 class Clock(Protocol):
-    """The nominal time of a trial, which begins at 0 and moves on at every control step.
+    """The nominal time of a trial, which begins at 0 and advances at every control step.
+
+    To iterate over it gives the reference at each step until the trial is over: its placement
+    (`pinocchio.SE3`) and body twist (`pinocchio.Motion`). `advance` is called after each step.
 
     Attributes:
         tau: nominal time on the reference [s].
-        most_steps: number of control steps after which the trial is over in any case.
+        most_steps: largest number of control steps of the trial.
     """
 
     tau: float
@@ -33,40 +36,29 @@ class Clock(Protocol):
 
     def __init__(self, scenario: Scenario) -> None: ...
 
-    @property
-    def is_over(self) -> bool:
-        """Whether the trial has come to its end."""
-        ...
-
-    def target(self) -> tuple[Any, Any]:
-        """Placement (`pinocchio.SE3`) and body twist (`pinocchio.Motion`) of the reference."""
+    def __iter__(self) -> Iterator[tuple[Any, Any]]:
+        """Give the reference at each step."""
         ...
 
     def advance(self, q: Array) -> None:
-        """Move on after a control step that ended in the configuration q (nq,)."""
+        """Advance after a control step that ended in the configuration q, (nq,)."""
         ...
 
 
 class TimeClock:
-    """Moves on by one control period at every step, whatever the robot does: tau = k dt."""
+    """Advances by one control period at every step: tau = k dt."""
 
     def __init__(self, scenario: Scenario) -> None:
         self.tau = 0.0
         self.most_steps = scenario.steps
         self._step, self._dt, self._targets = 0, scenario.dt, scenario.targets
 
-    @property
-    def is_over(self) -> bool:
-        """Whether the scenario's duration has passed."""
-        return self._step == self.most_steps
-
-    def target(self) -> tuple[Any, Any]:
-        """See `Clock`; the targets are computed once for all trials of a scenario."""
-        target: tuple[Any, Any] = self._targets[self._step]
-        return target
+    def __iter__(self) -> Iterator[tuple[Any, Any]]:
+        """Give the reference (see `Clock`), computed once for all trials of a scenario."""
+        return iter(self._targets[: self.most_steps])
 
     def advance(self, q: Array) -> None:
-        """Move on by one control period (see `Clock`)."""
+        """Advance by one control period (see `Clock`)."""
         self._step += 1
         self.tau = self._step * self._dt
 
@@ -76,41 +68,39 @@ class PathClock:
 
         tau <- min(tau + dt, max(tau, tau_near + dt))
 
-    with tau_near the nominal time of the path's nearest point to where the task frame is after the
-    step, in position and orientation (see `Embedding`), among those of
-    [tau - `LOOK_BACK_S`, tau + 2 dt]; the latest of equally near ones. An exact motion moves at the
-    nominal pace, and so does one that is late by less than a control period; a dwell, whose points
-    are all equally near, passes in full.
+    with tau_near the nominal time of the path's nearest point to the task frame after the step, in
+    position and orientation (see `Embedding`), in the window [tau - `LOOK_BACK_S`, tau + 2 dt]; the
+    latest of equally near ones. An exact motion advances at the nominal pace, and so does one that
+    is late by less than a control period; a dwell, whose points are all equally near, passes in
+    full. The trial is over when the path has ended, or after `Scenario.longest_path_run` times its
+    nominal duration.
     """
 
     def __init__(self, scenario: Scenario) -> None:
         assert scenario.embedded_path is not None
         self.tau = 0.0
         self.most_steps = max(1, round(scenario.longest_path_run * scenario.steps))
-        self._step, self._dt, self._target = 0, scenario.dt, scenario.target
+        self._dt, self._target = scenario.dt, scenario.target
         self._duration = scenario.reference.duration
         self._path, self._embedding = scenario.embedded_path, scenario.embedding
         self._frame, self._model = scenario.robot.frame_id, scenario.robot.model
         self._data = self._model.createData()
 
-    @property
-    def is_over(self) -> bool:
-        """Whether the path has ended, or the scenario's `longest_path_run` is over."""
-        return path_has_ended(self.tau, self._duration) or self._step == self.most_steps
-
-    def target(self) -> tuple[Any, Any]:
-        """See `Clock`."""
-        return self._target(self.tau)
+    def __iter__(self) -> Iterator[tuple[Any, Any]]:
+        """Give the reference (see `Clock`)."""
+        for _ in range(self.most_steps):
+            if path_has_ended(self.tau, self._duration):
+                break
+            yield self._target(self.tau)
 
     def advance(self, q: Array) -> None:
-        """Move on to where the robot has come, at most by one control period (see `Clock`)."""
+        """Advance to where the robot is, at most by one control period (see `Clock`)."""
         pin.forwardKinematics(self._model, self._data, q)
         X = pin.updateFramePlacement(self._model, self._data, self._frame)
         point = self._embedding.points(X.rotation[None], X.translation[None])[0]
         first, last = self.tau - LOOK_BACK_S, self.tau + 2 * self._dt
         near = self._path.latest_nearest(point, max(first, 0.0), min(last, self._duration))
         ahead = min(self.tau + self._dt, max(self.tau, near + self._dt))
-        self._step += 1
         self.tau = min(ahead, self._duration)
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from time import perf_counter_ns
 from typing import Final
 
-import msgspec
 import numpy as np
 import pinocchio as pin
 
@@ -24,14 +24,14 @@ from dikbench.simulation.trace import Trace
 from dikbench.solvers.checked_solve import CheckedSolve
 from dikbench.solvers.recheck.rechecked import RecheckedSteps
 
-DIVERGED_SPEED: Final = 1e6
-"""A commanded speed above this [rad/s] means that the run has diverged."""
+DIVERGED_SPEED_RAD_S: Final = 1e6
+"""Norm of a commanded velocity above which a run has diverged."""
 
 DIVERGED_ERROR: Final = 100.0
-"""A task error above this (m, rad) means that the run has diverged."""
+"""Norm of a task error (m, rad) above which a run has diverged."""
 
-ERROR_CHECK_PERIOD: Final = 16
-"""The task error is checked once in this many control steps."""
+ERROR_CHECK_PERIOD_STEPS: Final = 16
+"""Control steps between checks of the task error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,13 +39,13 @@ class Run:
     """A finished simulation.
 
     Attributes:
-        trace: what happened, up to the end.
-        status: `ok` if the run came to its end, else what ended it.
-        message: the reason, with the step at which it happened; empty for `ok`.
+        trace: the record up to the end.
+        status: `ok` if the run was completed, else the reason of its end.
+        message: the reason in words, with the step; empty for `ok`.
         kinematics_ns: time in kinematics and in posing the problems, over all steps [ns].
         formulation_ns: time in the formulation, its solver included [ns].
-        jacobians: Jacobians of the tracking task at every step, (n, m, nv), as the formulation saw
-            them.
+        jacobians: Jacobians of the tracking task at every step, (n, m, nv), as the formulation
+            had them.
     """
 
     trace: Trace
@@ -56,17 +56,9 @@ class Run:
     jacobians: Array
 
 
-class _Step(msgspec.Struct, eq=False):
-    """The record of a control step that was applied; its arrays are read-only (see `Trace`)."""
-
-    q: Array
-    tau: float
-    wanted: Array
-    jacobian: Array
-    commanded: Array
-    applied: Array
-    status: Status
-    relaxed: int
+_Step = tuple[Array, float, Array, Array, Array, Array, Status, int]
+"""The record of a control step that was applied, its arrays read-only: q, tau, desired, jacobian,
+commanded, applied, status, relaxed (see `Trace`)."""
 
 
 def simulate(
@@ -81,89 +73,91 @@ def simulate(
 
     Args:
         scenario: the case.
-        formulation: the law under test.
+        formulation: the formulation under test.
         solve: its solver.
-        plant: what the formulation sees of the robot, and what becomes of a commanded velocity.
-        mode: whether the reference moves on with the clock or waits for the robot.
-        seed: of the plant's noise.
+        plant: the measurement and the drive.
+        mode: whether the reference advances with the clock or waits for the robot.
+        seed: seed of the plant's noise.
 
     Returns:
         The trace and how the run ended; failures of the formulation are statuses, never exceptions.
     """
-    robot, dt, tracking = scenario.robot, scenario.dt, scenario.tracking
-    kinematics, clock, started = (
-        Kinematics(robot),
-        CLOCKS[mode](scenario),
-        plant.start(scenario, seed),
-    )
+    robot, model, dt = scenario.robot, scenario.robot.model, scenario.dt
+    tracking, tasks, constraints = scenario.tracking, scenario.tasks, scenario.constraints
+    kinematics, clock = Kinematics(robot), CLOCKS[mode](scenario)
+    started = plant.start(scenario, seed)
     q, v_prev = read_only(scenario.q0.copy()), read_only(scenario.v0.copy())
     steps: list[_Step] = []
     kinematics_ns = formulation_ns = 0
     status, message = Status.OK, ""
     solve.begin_run(clock.most_steps)
     try:
-        while not clock.is_over:
-            k, (target, twist), seen = len(steps), clock.target(), started.seen(q)
+        for target, twist in clock:
+            k, seen = len(steps), started.seen(q)
             start = perf_counter_ns()
             kinematics.update(seen)
             task = tracking.linearize(kinematics, target, twist)
-            problem = pose_problem(
-                kinematics, v_prev, dt, task, scenario.tasks, scenario.constraints
-            )
+            problem = pose_problem(kinematics, v_prev, dt, task, tasks, constraints)
             for each in problem.tasks:
-                each.J.flags.writeable = each.V.flags.writeable = False
+                each.J.setflags(write=False)
+                each.V.setflags(write=False)
             kinematics_ns += perf_counter_ns() - start
-            # What the formulation does to the problem reaches neither the record nor the plant.
-            wanted, jacobian = task.V, task.J
+            # The formulation may change the problem, but not the record or the plant's limits.
+            desired, jacobian = task.V, task.J
             limits = problem.limits if seen is q else robot.limits.at(q)
-            if k % ERROR_CHECK_PERIOD == 0 and task.error.dot(task.error) > DIVERGED_ERROR**2:
+            if k % ERROR_CHECK_PERIOD_STEPS == 0 and task.error.dot(task.error) > DIVERGED_ERROR**2:
                 raise TrialEnded(Status.DIVERGED, f"task error above {DIVERGED_ERROR:g} m, rad")
             answer = control_step(formulation, problem, solve, k)
             formulation_ns += answer.formulation_ns
-            if answer.square > DIVERGED_SPEED**2:
-                raise TrialEnded(Status.DIVERGED, f"commanded speed above {DIVERGED_SPEED:g} rad/s")
+            if answer.square > DIVERGED_SPEED_RAD_S**2:
+                raise TrialEnded(
+                    Status.DIVERGED, f"commanded speed above {DIVERGED_SPEED_RAD_S:g} rad/s"
+                )
             v = read_only(answer.velocity)
             applied = started.apply(v, limits)
             steps.append(
-                _Step(q, clock.tau, wanted, jacobian, v, applied, answer.status, problem.relaxed)
+                (q, clock.tau, desired, jacobian, v, applied, answer.status, problem.relaxed)
             )
-            q, v_prev = read_only(pin.integrate(robot.model, q, applied * dt)), applied
+            q, v_prev = read_only(pin.integrate(model, q, applied * dt)), applied
             clock.advance(q)
     except TrialEnded as ended:
         status, message = ended.status, f"step {len(steps)}: {ended}"
-    jacobians = _joined([step.jacobian for step in steps], len(scenario.rows), robot.nv)
-    trace = _trace(scenario, steps, q, clock.tau, jacobians, solve.rechecked(), mode)
+    trace, jacobians = _recorded(scenario, steps, q, clock.tau, solve.rechecked(), mode)
     return Run(trace, status, message, kinematics_ns, formulation_ns, jacobians)
 
 
-def _trace(
+def _recorded(
     scenario: Scenario,
     steps: list[_Step],
     q: Array,
     tau: float,
-    jacobians: Array,
     rechecked: RecheckedSteps,
     mode: ReferenceMode,
-) -> Trace:
-    """Make the trace of steps that ended in q at tau; those that went nowhere become `stuck`."""
+) -> tuple[Trace, Array]:
+    """Make the trace and the Jacobians (n, m, nv) of steps that ended in q at tau.
+
+    Steps that made less than `STUCK_PROGRESS` of the desired motion become `stuck`.
+    """
     n, nv, m = len(steps), scenario.robot.nv, len(scenario.rows)
-    wanted = _joined([step.wanted for step in steps], m)
-    commanded = _joined([step.commanded for step in steps], nv)
+    columns = [*zip(*steps, strict=True)] or [()] * 8
+    before, taus, desired_list, jacobian_list, commanded_list, applied, statuses, relaxed = columns
+    desired, commanded = _joined(desired_list, m), _joined(commanded_list, nv)
+    jacobians = _joined(jacobian_list, m, nv)
     achieved = np.einsum("kij,kj->ki", jacobians, commanded)
-    alpha = progress(wanted, achieved, row_weights(scenario.rows))
-    status = np.array([STEP_STATUSES.index(step.status) for step in steps], dtype=int)
+    alpha = progress(desired, achieved, row_weights(scenario.rows))
+    status = np.array([STEP_STATUSES.index(each) for each in statuses], dtype=int)
     ok = STEP_CODE[Status.OK]
     status[(status == ok) & rechecked.lied[:n]] = STEP_CODE[Status.NOT_VERIFIED]
     status[(status == ok) & (alpha < STUCK_PROGRESS)] = STEP_CODE[Status.STUCK]
-    return Trace(
+    trace = Trace(
         scenario.dt,
-        _joined([*(step.q for step in steps), q], scenario.robot.nq),
-        np.array([*(step.tau for step in steps), tau]),
-        wanted,
+        _joined((*before, q), scenario.robot.nq),
+        np.array([*taus, tau]),
+        desired,
         commanded,
-        _joined([step.applied for step in steps], nv),
+        _joined(applied, nv),
         status,
-        np.array([step.relaxed for step in steps], dtype=int),
+        np.array(relaxed, dtype=int),
         rechecked.claimed[:n],
         rechecked.verified[:n],
         rechecked.primal[:n],
@@ -172,8 +166,9 @@ def _trace(
         rechecked.distance[:n],
         mode,
     )
+    return trace, jacobians
 
 
-def _joined(parts: list[Array], *shape: int) -> Array:
+def _joined(parts: Sequence[Array], *shape: int) -> Array:
     """Join arrays of one shape into one, (len(parts), *shape)."""
     return np.concatenate(parts or [np.empty((0, *shape))]).reshape(len(parts), *shape)

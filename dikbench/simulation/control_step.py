@@ -1,4 +1,4 @@
-"""One control step: ask the formulation, and fall back on slowing down where it has no answer."""
+"""One control step: the formulation's velocity, or a slowdown where it has no answer."""
 
 from __future__ import annotations
 
@@ -15,11 +15,10 @@ from dikbench.simulation.status import Status
 from dikbench.solvers.checked_solve import CheckedSolve
 
 FLOATS = np.dtype(float)
-OK = Status.OK  # an attribute of an enumeration costs as much as a small product
 
 
 class TrialEnded(Exception):
-    """A formulation did what ends a trial; carries the status and the message."""
+    """An error of a formulation that ends a trial, with the status and the message."""
 
     def __init__(self, status: Status, message: str) -> None:
         super().__init__(message)
@@ -46,11 +45,11 @@ class StepAnswer(msgspec.Struct, eq=False):
 def control_step(
     formulation: Formulation, problem: DikProblem, solve: CheckedSolve, step: int = 0
 ) -> StepAnswer:
-    """Ask the formulation for the velocity of this step (its number in the run).
+    """Ask the formulation for the velocity of one step of a run.
 
     Raises:
-        TrialEnded: if the formulation raises anything but `CannotAnswer`, or returns what is not a
-            finite vector (nv,) of real numbers.
+        TrialEnded: if the formulation raises another error than `CannotAnswer`, or does not return
+            a finite vector (nv,) of real numbers.
     """
     solve.begin_step(step)
     start = perf_counter_ns()
@@ -67,15 +66,15 @@ def control_step(
         message = str(error).strip().partition("\n")[0]
         raise TrialEnded(Status.FORMULATION_ERROR, f"{type(error).__name__}: {message}") from error
     formulation_ns = perf_counter_ns() - start - solve.checking_ns
-    return StepAnswer(v, OK, formulation_ns, _square(v, problem.robot.nv))
+    return StepAnswer(v, Status.OK, formulation_ns, _square(v, problem.robot.nv))
 
 
 def _square(v: object, nv: int) -> float:
-    """Check what a formulation returned, and compute v^T v of it."""
+    """Check the velocity of a formulation and compute v^T v."""
     if type(v) is not np.ndarray or v.shape != (nv,) or v.dtype is not FLOATS:
         _check_velocity(v, nv)
     square: float = v.dot(v)  # type: ignore[attr-defined]
-    # One product tells almost always, and costs a third of asking every entry.
+    # The product is finite if the entries are, which takes a third of checking every entry.
     if not square < np.inf and not np.isfinite(v).all():  # type: ignore[call-overload]
         raise TrialEnded(Status.NOT_FINITE, f"velocity {v.tolist()}")  # type: ignore[attr-defined]
     return square
@@ -92,14 +91,13 @@ def _check_velocity(v: object, nv: int) -> None:
 def fallback(problem: DikProblem) -> Array:
     """Slow down uniformly: v = c v_prev, clipped to the velocity box.
 
-    c is the smallest factor in [0, 1] that neither a joint's acceleration limit forbids,
-    1 - min_i a_i dt / |v_prev,i|, nor a row of G v <= h (a torque that is not there cannot brake);
-    without either, or without v_prev, the robot stops at once (outside a position limit the box
-    then asks for the way back).
+    c is the smallest factor in [0, 1] that the acceleration limits allow,
+    1 - min_i a_i dt / |v_prev,i|, and the rows G v <= h (torques that brake are limited too).
+    Without either, or without v_prev, the robot stops at once; outside a position limit the box
+    leads it back inside.
     """
-    box = velocity_box(
-        problem.limits, problem.v_prev, problem.dt
-    )  # not recorded as the formulation's
+    # Not `problem.box`, which records relaxed bounds as the formulation's.
+    box = velocity_box(problem.limits, problem.v_prev, problem.dt)
     v = np.zeros(problem.robot.nv)
     if problem.v_prev is not None:
         v = _slowest(problem, problem.v_prev) * problem.v_prev
@@ -107,7 +105,7 @@ def fallback(problem: DikProblem) -> Array:
 
 
 def _slowest(problem: DikProblem, v_prev: Array) -> float:
-    """The smallest factor c (see `fallback`)."""
+    """Compute the smallest factor c (see `fallback`)."""
     factors = [0.0]
     acceleration = problem.limits.joint.acceleration
     if acceleration is not None:

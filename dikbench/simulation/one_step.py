@@ -1,4 +1,4 @@
-"""One control step for a person at a prompt."""
+"""One control step, for interactive use."""
 
 from __future__ import annotations
 
@@ -34,11 +34,10 @@ class DikAnswer:
     """The answer to one control step.
 
     Attributes:
-        velocity: joint velocity, (nv,) [rad/s or m/s]; the fallback's where the formulation
-            had none.
-        progress: share of the wanted motion that it makes, <J v, V>/|V|^2 with angular rows
-            weighted by L = 0.2 m (the alpha of formulations that scale); NaN where no motion is
-            desired.
+        velocity: joint velocity, (nv,) [rad/s or m/s]; the fallback's where the formulation has no
+            answer.
+        progress: achieved share of the desired motion, <J v, V>/|V|^2 with angular rows weighted
+            by L = 0.2 m (the alpha of formulations that scale); NaN where no motion is desired.
         status: how the step ended.
         relaxed: number of joints whose acceleration bound had to be given up.
     """
@@ -73,20 +72,20 @@ def solve_dik(
         robot: the robot, with the limits that are in force.
         q: configuration, (nq,).
         formulation: a formulation or its selector, such as `dls[damping=0.1]`.
-        twist: wanted twist of the task frame, (linear; angular), (6,) [m/s; rad/s].
-        target: wanted placement of the task frame (`pinocchio.SE3`); give this or a twist.
+        twist: desired twist of the task frame, (linear; angular), (6,) [m/s; rad/s].
+        target: desired placement of the task frame (`pinocchio.SE3`); give this or a twist.
         reference_frame: the axes in which the twist is given, Pinocchio's names.
-        gain: of the target, 1/s; default 1/dt (there in one step).
+        gain: gain on the target's error [1/s]; default: 1/dt, which reaches it in one step.
         dt: control period [s].
         solver: a solver's selector, such as `osqp[eps_abs=1e-6]`; default: daqp, or clarabel for a
             formulation written in cvxpy. Not used by formulations that need none.
-        v_prev: velocity applied in the step before, (nv,); None means no acceleration bound.
+        v_prev: velocity applied in the previous step, (nv,); None: no acceleration bound.
         tasks: secondary tasks.
-        constraints: what must hold in addition to the limits of the joints.
+        constraints: conditions in addition to the joint limits.
 
     Raises:
-        DikbenchError: on a wrong name, shape or value, or a formulation that raises, or answers
-            with a wrong shape or NaN.
+        DikbenchError: on a wrong name, shape or value, or a formulation that raises an error or
+            returns a wrong shape or NaN.
     """
     if not isinstance(robot, Robot):
         raise DikbenchError(
@@ -136,7 +135,7 @@ def _solve_for(formulation: Formulation, selector: str | None) -> CheckedSolve:
     program = program_of(formulation)
     if program is None:
         if selector is not None:
-            parse_solver(selector)  # a wrong name is an error even where it is not needed
+            parse_solver(selector)  # a wrong name is an error even where no solver is needed
         return make_solve(None, None)
     solver = parse_solver(DEFAULT_SOLVER[program] if selector is None else selector)
     reason = why_not(solver, program)

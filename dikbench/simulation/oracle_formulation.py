@@ -1,4 +1,4 @@
-"""The joint motion behind a scenario, given to the harness as a formulation: the oracle row."""
+"""The exact joint motion of a scenario as a formulation, for the oracle's row."""
 
 from __future__ import annotations
 
@@ -14,9 +14,7 @@ from dikbench.scenario.scenario import Scenario
 
 @dataclass(frozen=True, eq=False)
 class OracleFormulation:
-    """Commands the velocities of a known joint motion one after the other, whatever the problem.
-
-    It is used up by one run.
+    """Commands the velocities of a known joint motion in sequence, for one run.
 
     Attributes:
         velocities: (nv,) [rad/s] each, one per control step.

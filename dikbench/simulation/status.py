@@ -1,4 +1,4 @@
-"""Why a control step or a trial ended as it did."""
+"""The outcomes of control steps and trials."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import Enum
 
 
 class Status(Enum):
-    """An outcome; its value is its name in tables, its `sentence` says what it means."""
+    """An outcome; its value is its name in tables, its `sentence` explains it."""
 
     sentence: str
 
@@ -18,10 +18,10 @@ class Status(Enum):
         return member
 
     OK = ("ok", "The step was answered, or the trial ran to its end.")
-    STUCK = ("stuck", "The answer makes less than 1 % of the wanted motion.")
+    STUCK = ("stuck", "The answer makes less than 1 % of the desired motion.")
     INFEASIBLE = (
         "infeasible",
-        "The law's program has no feasible point; the fallback was applied.",
+        "The program has no feasible point; the fallback was applied.",
     )
     SOLVER_FAILED = (
         "solver-failed",
@@ -32,9 +32,12 @@ class Status(Enum):
         "The solver claimed success, the recomputed residuals say otherwise.",
     )
     DIVERGED = ("diverged", "The motion left all bounds; the trial was ended.")
-    FORMULATION_ERROR = ("formulation-error", "The law raised an error that is not an answer.")
-    WRONG_SHAPE = ("wrong-shape", "The law returned something that is not a vector of nv numbers.")
-    NOT_FINITE = ("not-finite", "The law returned NaN or infinity.")
+    FORMULATION_ERROR = (
+        "formulation-error",
+        "The formulation raised an error that is not an answer.",
+    )
+    WRONG_SHAPE = ("wrong-shape", "The formulation did not return a vector of nv numbers.")
+    NOT_FINITE = ("not-finite", "The formulation returned NaN or infinity.")
     TIMEOUT = (
         "timeout",
         "The trial ran out of wall-clock time; lower its size or raise the limit.",
@@ -51,6 +54,6 @@ STEP_STATUSES = (
     Status.SOLVER_FAILED,
     Status.NOT_VERIFIED,
 )
-"""What a step can be, in the order of their codes in a trace."""
+"""The outcomes of a step, in the order of their codes in a trace."""
 
 STEP_CODE = {status: code for code, status in enumerate(STEP_STATUSES)}

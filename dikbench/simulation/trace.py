@@ -1,4 +1,4 @@
-"""What happened in a trial: arrays over its control steps, nothing derived."""
+"""The record of a trial: arrays over its control steps, without derived quantities."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ class Trace:
 
     Attributes:
         dt: control period [s].
-        q: configurations, (n + 1, nq): before each step, and after the last.
-        tau: nominal time on the reference at each of them, (n + 1,) [s].
+        q: configurations before each step and after the last, (n + 1, nq).
+        tau: nominal time on the reference at each configuration, (n + 1,) [s].
         wanted: desired twist V of the tracking task, (n, m) [m/s; rad/s], in the task frame.
         commanded: the formulation's velocity (or the fallback's), (n, nv) [rad/s].
-        applied: what the plant made of it, (n, nv) [rad/s].
+        applied: the velocity that the plant applied, (n, nv) [rad/s].
         status: codes of `STEP_STATUSES`, (n,).
         relaxed: joints whose acceleration bound was given up, (n,).
-        claimed, verified: what the solver said of the step's programs and what the recheck says, 1
+        claimed, verified: the solver's claim about the step's programs and the recheck's result, 1
             or 0; -1 where nothing was solved, (n,) each (see `RecheckedSteps`).
         primal, dual, gap: largest residuals of the step's programs, (n,) (see `Residuals`).
-        distance: their largest distance from the optimum, (n,) [rad/s].
-        mode: what moved the reference on: the clock, or the robot along its path.
+        distance: largest distance of an answer from the optimum, (n,) [rad/s].
+        mode: whether the reference advanced with the clock or with the robot along its path.
     """
 
     dt: float
@@ -58,7 +58,7 @@ class Trace:
         return len(self.applied)
 
     def share(self, status: Status) -> float:
-        """Share of the steps with this status; NaN if there was none."""
+        """Compute the share of the steps with this status; NaN without steps."""
         if not self.steps:
             return float("nan")
         return float(np.mean(self.status == STEP_CODE[status]))
@@ -66,7 +66,7 @@ class Trace:
     def save(self, path: Path) -> None:
         """Write the arrays to an Arrow file (LZ4), one column each and a row per control step.
 
-        The last row is the state after the last step; there is nothing else in it.
+        The last row has the state after the last step only.
         """
         columns = {
             field.name: _column(getattr(self, field.name), self.steps + 1)
@@ -83,7 +83,7 @@ class Trace:
         """Read a trace that `save` wrote.
 
         Raises:
-            DikbenchError: if the file is not one.
+            DikbenchError: if the file is not a trace.
         """
         try:
             with pa.ipc.open_file(str(path)) as file:
@@ -91,7 +91,7 @@ class Trace:
             arrays: dict[str, Any] = {name: _array(table.column(name)) for name in _COLUMNS}
             dt = float(table.schema.metadata[b"dt"])
             mode = _mode(table.schema.metadata, arrays["tau"], dt)
-        except (OSError, KeyError, TypeError, ValueError) as error:  # Arrow's own are among them
+        except (OSError, KeyError, TypeError, ValueError) as error:  # with Arrow's own errors
             reason = " ".join(str(error).split())
             raise DikbenchError(f"trace {path}: not a trace of dikbench: {reason}") from None
         n = len(arrays["q"]) - 1
@@ -114,7 +114,7 @@ def _mode(metadata: Mapping[bytes, bytes], tau: Array, dt: float) -> ReferenceMo
 
 
 def _column(values: Array | Indices, rows: int) -> Any:
-    """An array (k, ...) as a column of at least k rows; what is missing is 0."""
+    """Turn an array (k, ...) into a column of at least k rows; missing rows are 0."""
     if len(values) < rows:
         filled = np.zeros((rows, *values.shape[1:]), dtype=values.dtype)
         filled[: len(values)] = values
@@ -124,7 +124,7 @@ def _column(values: Array | Indices, rows: int) -> Any:
 
 
 def _array(column: Any) -> Any:
-    """The column of a table as an array."""
+    """Turn the column of a table into an array."""
     whole = column.combine_chunks()
     if not pa.types.is_fixed_size_list(whole.type):
         return whole.to_numpy()

@@ -1,4 +1,4 @@
-"""The `solve` that is handed to a law: timed, counted, its answers rechecked off the clock."""
+"""The `solve` of a formulation: timed, counted, its answers rechecked outside the timing."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from dikbench.solvers.catalogue.presets import TOLERANCES
 from dikbench.solvers.recheck.feasibility import is_feasible
 from dikbench.solvers.recheck.rechecked import RecheckedSteps, Solved
 
-BATCH: Final = 512
-"""Answers that wait for their recheck: many, since they are rechecked at once; not the whole run,
-since each keeps its program."""
+ANSWERS_PER_RECHECK: Final = 512
+"""Answers that are rechecked together: many, since that is faster; not all of a run, since each
+keeps its program in memory."""
 
 BackEnd = Callable[[Any, int], Answer]
 """(program, number of the call within its step) -> answer."""
 
 
 class CheckedSolve:
-    """One solver for one trial; the records are those of the current control step.
+    """The solver of one trial, with the records of the current control step.
 
     Attributes:
         calls: number of programs solved.
         solve_ns: time inside the solver and its interface [ns].
-        core_ns: the solver library's own share of it [ns].
-        checking_ns: time spent on deciding why there is no answer, which is on nobody's clock [ns].
+        core_ns: time inside the solver library alone [ns].
+        checking_ns: time spent on deciding why there is no answer, which counts for nobody [ns].
     """
 
     __slots__ = (
@@ -61,22 +61,22 @@ class CheckedSolve:
         self.begin_step(0)
 
     def begin_run(self, steps: int) -> None:
-        """Forget everything, and make room for so many control steps."""
+        """Forget everything, and allocate records for a number of control steps."""
         self._solved.clear()
         self._rechecked = RecheckedSteps(steps)
 
     def begin_step(self, step: int) -> None:
-        """Forget the records of the step before; its programs are kept for the recheck."""
+        """Reset the records of the previous step; its programs are kept for the recheck."""
         self._step = step
         self.calls = 0
         self.solve_ns = 0
         self.core_ns = 0
         self.checking_ns = 0
-        if len(self._solved) >= BATCH:
+        if len(self._solved) >= ANSWERS_PER_RECHECK:
             self._recheck()
 
     def rechecked(self) -> RecheckedSteps:
-        """Recheck the answers that wait for it, and return what was found in the run so far."""
+        """Recheck the remaining answers, and return the results of the run so far."""
         self._recheck()
         return self._rechecked
 
@@ -95,7 +95,7 @@ class CheckedSolve:
         if self._checks:
             self._solved.append((self._step, program, answer))
         x = answer.x
-        # One product says whether there is an x and whether it is finite.
+        # One product tells whether x is finite.
         if answer.claimed and x is not None and x.dot(x) < np.inf:
             return x
         error = self._reason(program)
@@ -103,7 +103,7 @@ class CheckedSolve:
         raise error
 
     def _reason(self, program: QuadraticProgram | ModelledProgram) -> Infeasible | SolverFailed:
-        """Why there is no answer; the timing pass does not ask."""
+        """Decide why there is no answer; the timing pass does not ask."""
         matrices = program.matrices() if isinstance(program, ModelledProgram) else program
         if not self._checks or is_feasible(matrices):
             return SolverFailed("the solver gave no answer to a feasible program")
@@ -111,7 +111,7 @@ class CheckedSolve:
 
 
 class NoSolve(CheckedSolve):
-    """The `solve` of a law that declared that it needs none."""
+    """The `solve` of a formulation that declares no program."""
 
     __slots__ = ()
 
@@ -120,7 +120,9 @@ class NoSolve(CheckedSolve):
 
 
 def _refuse(program: object, site: int) -> Answer:
-    raise DikbenchError("the law called solve but declares no program; set program = 'qp' or 'lp'")
+    raise DikbenchError(
+        "the formulation called solve but declares no program; set program = 'qp' or 'lp'"
+    )
 
 
 def make_solve(
@@ -129,10 +131,10 @@ def make_solve(
     """Build the `solve` for one trial.
 
     Args:
-        solver: the solver of the trial, or None for a law that needs none.
-        program: what the law solves (see `Program`).
-        checks: whether answers are rechecked (the timing pass does not, so that every solver finds
-            the caches as its law left them).
+        solver: the solver of the trial, or None for a formulation that needs none.
+        program: what the formulation solves (see `ProgramKind`).
+        checks: whether answers are rechecked; not in the timing pass, where a recheck would
+            change the caches.
     """
     if solver is None or program is None:
         return NoSolve()

@@ -15,7 +15,7 @@ from dikbench.arrays import Array
 
 
 def data_profile(errors: Array, targets: Array) -> Array:
-    """The share of the problems with an error below each target, (targets, formulations).
+    """Compute the share of problems with an error below each target, (targets, formulations).
 
     Args:
         errors: (problems, formulations); infinite or NaN where a problem was not solved.

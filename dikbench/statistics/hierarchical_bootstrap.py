@@ -5,10 +5,10 @@ family. So families are drawn with replacement, in each drawn family scenarios, 
 seeds (Davison & Hinkley 1997, section 3.8). `scipy.stats.bootstrap` draws from one flat sample and
 cannot express this; on a flat sample the two agree.
 
-Drawn indices are never made: a family drawn c times has its S scenarios drawn c S times in all,
-which is one multinomial draw, and likewise for seeds. What is left are weights, the same for all
-formulations and metrics (so that their differences are resampled together), and a product of
-matrices.
+Indices are not drawn: a family drawn c times has its S scenarios drawn c S times in all, which is
+one multinomial draw, and the same holds for seeds. The result is weights, which are the same for
+all formulations and metrics (so that their differences are resampled together), and a matrix
+product.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ import numpy as np
 from dikbench.arrays import Array, Indices
 
 RESAMPLES = 2000
-SEED = 20020101
-COVERAGE = 0.95
+RESAMPLING_SEED = 20020101
+INTERVAL_COVERAGE = 0.95
 
 
 def draw_weights(
     families: Sequence[Any],
     scenarios: Sequence[Any],
     resamples: int = RESAMPLES,
-    seed: int = SEED,
+    seed: int = RESAMPLING_SEED,
 ) -> Array:
-    """How often each trial is drawn in each resample, (resamples, n).
+    """Count how often each trial is drawn in each resample, (resamples, n).
 
     Args:
         families: the family of each of n trials.
-        scenarios: the scenario of each, told apart within its family. Trials of one scenario are
+        scenarios: the scenario of each, distinguished within its family. Trials of one scenario are
             its seeds.
         resamples: number of resamples.
         seed: of the drawing; the same seed gives the same intervals.
@@ -56,10 +56,10 @@ def draw_weights(
 
 
 def mean_intervals(values: Array, weights: Array) -> Array:
-    """95 % percentile intervals of the means of columns, (k, 2).
+    """Compute the 95 % percentile intervals of the means of columns, (k, 2).
 
-    NaN where all values are equal, or there is one: what was not seen cannot be resampled (no
-    failure in ten trials is no proof of none).
+    NaN where all values are equal or there is one, since values that did not occur cannot be
+    resampled (ten trials without failure do not exclude one).
 
     Args:
         values: (n, k), a column per formulation; NaN counts nowhere.
@@ -68,7 +68,7 @@ def mean_intervals(values: Array, weights: Array) -> Array:
     defined = ~np.isnan(values)
     number = weights @ defined.astype(float)
     sums = weights @ np.where(defined, values, 0.0)
-    tails = ((1 - COVERAGE) / 2, (1 + COVERAGE) / 2)
+    tails = ((1 - INTERVAL_COVERAGE) / 2, (1 + INTERVAL_COVERAGE) / 2)
     intervals = np.full((values.shape[1], 2), np.nan)
     spread = _largest(values) > -_largest(-values)
     for contender in np.flatnonzero(spread):
@@ -78,11 +78,11 @@ def mean_intervals(values: Array, weights: Array) -> Array:
 
 
 def _largest(values: Array) -> Array:
-    """The largest number of each column, NaN where there is none."""
+    """Return the largest number of each column, NaN where there is none."""
     largest: Array = np.fmax.reduce(values, axis=0, initial=np.nan)
     return largest
 
 
 def _equal_multinomial(random: np.random.Generator, draws: Indices, boxes: int) -> Indices:
-    """Counts of `draws` (k,) balls in equally likely boxes, (k, boxes)."""
+    """Draw the counts of `draws` (k,) balls in equally likely boxes, (k, boxes)."""
     return random.multinomial(draws, np.full(boxes, 1 / boxes))

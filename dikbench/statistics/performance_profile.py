@@ -6,7 +6,7 @@ limit for large tau how often it solves a problem at all.
 
 The best is taken over the formulations at hand, so that the order of two formulations can flip when
 a third is taken out (Gould & Scott 2016): profiles of all formulations rank the first one only.
-Profiles of two formulations alone stand beside them.
+Profiles of pairs of formulations are given in addition.
 
 Source: Dolan & Moré 2002, Benchmarking optimization software with performance profiles; Gould &
 Scott 2016, A note on performance profiles for benchmarking software.
@@ -20,10 +20,9 @@ from dikbench.arrays import Array
 
 
 def performance_ratios(costs: Array) -> Array:
-    """r_ps, (problems, formulations), infinite where a formulation did not solve a problem.
+    """Compute r_ps, (problems, formulations), infinite where a problem was not solved.
 
-    Problems that no formulation solved stay, with infinite ratios: every profile ends below 1 by
-        them.
+    Problems that no formulation solved keep infinite ratios, so that every profile ends below 1.
 
     Args:
         costs: t_ps > 0 (raise to a floor below which costs count as equal); infinite or NaN where
@@ -37,7 +36,7 @@ def performance_ratios(costs: Array) -> Array:
 
 
 def profile(ratios: Array, factors: Array) -> Array:
-    """rho_s at each factor tau, (factors, formulations); NaN where there are no problems.
+    """Compute rho_s at each factor tau, (factors, formulations); NaN where there are no problems.
 
     Args:
         ratios: (problems, formulations), of `performance_ratios`.
@@ -51,7 +50,7 @@ def profile(ratios: Array, factors: Array) -> Array:
 
 
 def area(ratios: Array, largest: float) -> Array:
-    """The mean height of each profile over 1 <= tau <= largest on a logarithmic axis, (laws,).
+    """Compute each profile's mean height over 1 <= tau <= largest, log axis, (formulations,).
 
     Args:
         ratios: (problems, formulations), of `performance_ratios`; at least one problem.

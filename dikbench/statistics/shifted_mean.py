@@ -8,7 +8,7 @@ from dikbench.arrays import Array
 
 
 def shifted_geometric_mean(values: Array, shift: float) -> float:
-    """exp(mean ln(x + s)) - s over the values that are not NaN; NaN where there are none.
+    """Compute exp(mean ln(x + s)) - s over the values that are not NaN; NaN without any.
 
     It treats x << s alike and averages the logarithms of x >> s: a shift far above the values makes
     an arithmetic mean of it, hence a shift near their median.
@@ -27,7 +27,7 @@ def shifted_geometric_mean(values: Array, shift: float) -> float:
 
 
 def shift_near_median(values: Array) -> float:
-    """The median to one significant digit, as a round shift that can be stated in a heading.
+    """Round the median to one significant digit, as a shift that a heading can state.
 
     Where more than half of the values are zero it is the median of the positive ones, and 1 where
     all are.

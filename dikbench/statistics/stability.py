@@ -1,4 +1,4 @@
-"""Whether timings can be trusted: rules in the spirit of pyperf's, fit for microseconds."""
+"""Stability of timings: rules like pyperf's, adapted to microseconds."""
 
 from __future__ import annotations
 
@@ -13,19 +13,18 @@ STABLE: Final = "stable"
 FEWEST_ROUNDS: Final = 3
 FEWEST_SAMPLES: Final = 100
 
-DRIFT: Final = 0.25
-"""How far a round's median may lie from the median of all, as a share of it: machines change their
-clock by more than half within minutes."""
+LARGEST_DRIFT_SHARE: Final = 0.25
+"""Largest distance of a round's median from the median of all, as a share of it."""
 
-SPREAD: Final = 0.5
-"""How far apart the quartiles of all samples may lie, as a share of the median."""
+LARGEST_SPREAD_SHARE: Final = 0.5
+"""Largest distance between the quartiles of all samples, as a share of the median."""
 
 
 def stability_of(samples: Array) -> str:
     """Judge the timings of one cell.
 
-    Single slow samples are no fault of a measurement (they are what the quantiles report), and of
-    calls this short the standard deviation says only that: hence medians and quartiles.
+    Medians and quartiles are used, since the standard deviation of such short calls depends on
+    single slow samples, which the quantiles report.
 
     Args:
         samples: times, (rounds, problems); NaN where the formulation broke.
@@ -43,10 +42,10 @@ def stability_of(samples: Array) -> str:
         )
     middle = float(np.median(timed))
     drift = float(np.abs(np.median(samples, axis=1) - middle).max()) / middle
-    if drift > DRIFT:
+    if drift > LARGEST_DRIFT_SHARE:
         return f"drift: a round's median is {100 * drift:.0f} % off the median of all"
     low, high = np.quantile(timed, (0.25, 0.75))
     spread = float(high - low) / middle
-    if spread > SPREAD:
+    if spread > LARGEST_SPREAD_SHARE:
         return f"spread: the quartiles are {100 * spread:.0f} % of the median apart"
     return STABLE

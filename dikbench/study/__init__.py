@@ -1,1 +1,1 @@
-"""Which cells to run: studies, trials, their identity."""
+"""Studies, their trials, and the identity of a trial."""

@@ -1,4 +1,4 @@
-"""What a trial is made of, as a hash: the same trial has the same id in any process, on any day."""
+"""Ids of trials: hashes of everything that a trial consists of."""
 
 from __future__ import annotations
 
@@ -18,12 +18,11 @@ from dikbench.study.trial import NO_SOLVER, Trial
 
 
 def trial_id(trial: Trial) -> str:
-    """The id of a trial, 16 hexadecimal digits.
+    """Return the id of a trial, 16 hexadecimal digits.
 
-    Made of the formulation and its parameters, the scenario family and its parameters, both with
-    the version of their source (see `source_digest`); the solver, how it is called and its
-    settings; plant, reference mode and seed. Selectors that mean the same (a default that is spelt
-    out) give the same id.
+    It is a hash of the formulation and the scenario family with their parameters and sources (see
+    `source_digest`), the solver with its interface and settings, the plant, the reference mode and
+    the seed. Selectors with the same meaning, such as an explicit default, give the same id.
 
     Raises:
         DikbenchError: if a selector does not name anything valid.
@@ -54,7 +53,7 @@ def _formulation(selector: Selector) -> str:
 
 @lru_cache(maxsize=65536)
 def scenario_id(selector: Selector) -> str:
-    """The id of a scenario: its family, parameters and the version of its source, not its seed."""
+    """Return the id of a scenario: family, parameters and source version, without the seed."""
     values = {key: _described(value) for key, value in scenario_parameters(selector).items()}
     plugin = scenario_plugin(selector.name)
     return digest(json.dumps([selector.name, values, source_digest(plugin)], sort_keys=True))
@@ -72,7 +71,7 @@ def _solver(selector: Selector) -> str:
 
 
 def _described(value: Any) -> str:
-    """A parameter's value; of a file that it names, the contents as well."""
+    """Write a parameter's value; of a file that it names, the contents as well."""
     if isinstance(value, str) and os.path.isfile(value):
         return f"{value!r} {digest_of_file(value)}"
     return repr(value)

@@ -1,4 +1,4 @@
-"""The plan of a study: every trial that it asks for, each once."""
+"""The plan of a study: all its trials, each once."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from dikbench.study.study import Study, load_study
 from dikbench.study.trial import NO_SOLVER, Trial
 
 SCENARIOS_BUILT_FIRST: Final = 40
-"""Scenarios of a study that are built before anything runs; of the others, in studies with
-hundreds, the parameters are checked, and a certificate that fails makes a skipped row."""
+"""Number of scenarios that are built before anything runs; of the others the parameters are
+checked, and a failed certificate gives a skipped row."""
 
-IDEAL: Final = Selector("ideal")
+IDEAL_PLANT: Final = Selector("ideal")
 
 
 class PlannedTrial(msgspec.Struct, frozen=True):
-    """A trial, its id, and why it cannot run, if it cannot."""
+    """A trial, its id, and the reason if it cannot run."""
 
     id: str
     trial: Trial
@@ -42,9 +42,9 @@ class PlannedTrial(msgspec.Struct, frozen=True):
 def expand(study: Study) -> list[PlannedTrial]:
     """List every trial of a study, in a fixed order, each once.
 
-    Names, parameters and solvers are checked, and the first scenarios are built, so that a mistake
-    shows before anything runs. A formulation and a solver that cannot work together stay in the
-    plan, with the reason.
+    Names, parameters and solvers are checked, and the first scenarios are built, so that mistakes
+    are found before anything runs. A formulation and a solver that do not work together stay in
+    the plan, with the reason.
 
     Raises:
         DikbenchError: on the first selector that does not name anything valid.
@@ -64,8 +64,8 @@ def expand(study: Study) -> list[PlannedTrial]:
     for cells in study.cells:
         for formulation in map(parse_selector, cells.formulations):
             is_oracle = formulation.name == ORACLE
-            # Nothing is fed back to the oracle: there is one way to run it.
-            plants = [IDEAL] if is_oracle else all_plants
+            # The oracle has no feedback, so plants and reference modes make no difference.
+            plants = [IDEAL_PLANT] if is_oracle else all_plants
             references = ("time",) if is_oracle else study.references
             for solver, skip in _solvers_for(study, formulation, cells.solvers):
                 for scenario, plant, reference, seed in itertools.product(

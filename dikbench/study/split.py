@@ -1,4 +1,4 @@
-"""The train split and the test split: what tuning may look at, and what it must not."""
+"""The train split, which tuning may use, and the test split, which it must not use."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from dikbench.study.identity import scenario_id
 SPLITS: Final[Mapping[str, range]] = MappingProxyType(
     {"train": range(1, 100), "test": range(100, 1000)}
 )
-"""The seeds of each split. Seed 0, the unperturbed case that everybody looks at, is in neither."""
+"""The seeds of each split; seed 0, the unperturbed case, is in neither."""
 
 
 def check_split(
@@ -23,10 +23,10 @@ def check_split(
     seeds: Sequence[int],
     others: Sequence[Selector],
 ) -> None:
-    """Check that a study keeps to its split.
+    """Check that a study uses seeds and scenarios of its split only.
 
     Args:
-        name: the study's.
+        name: name of the study.
         split: `train` or `test`.
         scenarios: selectors of its scenarios.
         seeds: its seeds.

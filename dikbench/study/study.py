@@ -1,4 +1,4 @@
-"""Studies: which cells to run. One TOML file; it only selects and sets parameters."""
+"""Studies: TOML files that select cells and set their parameters."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ class TimingSettings(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """The timing pass.
 
     Attributes:
-        reference: the formulation whose run supplies the problems of each scenario.
-        problems: how many of them, contiguous, from the middle of the run.
-        rounds: how often they are replayed.
-        scenarios: which of the study's scenarios are timed; empty: all.
+        reference: the formulation whose run gives the problems of each scenario.
+        problems: number of contiguous problems, from the middle of the run.
+        rounds: number of rounds in which they are solved.
+        scenarios: the scenarios of the study to time; empty: all.
     """
 
     reference: str
@@ -54,18 +54,18 @@ class TimingSettings(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Study(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """A selection of cells; selectors stand in it as text.
+    """A selection of cells, with selectors as texts.
 
     Attributes:
         description: one line.
         cells: formulations with their solvers.
         scenarios: selectors of scenarios.
         plants, references, seeds: see `Trial`.
-        split: "train" or "test" holds the study to the seeds and scenarios of that split (see
+        split: "train" or "test" restricts the study to the seeds and scenarios of that split (see
             `dikbench.study.split`); empty: any.
-        example: the scenario whose runs are drawn against time; default: the first one.
-        timing: the timing pass; None: no times are taken.
-        name: the study's name (from the file's).
+        example: the scenario whose runs are drawn over time; default: the first one.
+        timing: the timing pass; None: no timing.
+        name: name of the study; default: the file's.
     """
 
     description: str
@@ -81,7 +81,7 @@ class Study(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 def shipped_studies() -> dict[str, Path]:
-    """The studies that come with dikbench, by name."""
+    """Return the files of the studies that come with dikbench, by name."""
     folder = Path(str(resources.files("dikbench.study") / "studies"))
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
@@ -113,7 +113,7 @@ def load_study(name_or_file: str) -> Study:
 
 
 def _spread(study: Study) -> Study:
-    """The study with one value per parameter in each of its selectors (see `alternatives`)."""
+    """Return the study with one value per parameter in each selector (see `alternatives`)."""
     timing, example = study.timing, study.example
     if timing is not None:
         timing = msgspec.structs.replace(timing, scenarios=_each("scenarios", timing.scenarios))
@@ -131,7 +131,7 @@ def _spread(study: Study) -> Study:
 
 
 def _each(axis: str, selectors: Iterable[str]) -> tuple[str, ...]:
-    """List every selector that those of an axis stand for, each once, in its canonical text."""
+    """List the selectors that those of an axis stand for, each once, in canonical form."""
     found: dict[str, None] = {}
     for given in selectors:
         for one in alternatives(given):
@@ -140,14 +140,14 @@ def _each(axis: str, selectors: Iterable[str]) -> tuple[str, ...]:
 
 
 def _canonical(axis: str, selector: Selector) -> Selector:
-    """Put the parameters of a selector in one order, whoever wrote it."""
+    """Put the parameters of a selector in one order."""
     if axis == "solvers":
         return selector.ordered(("interface", "preset", *sorted(selector.parameters)))
     return in_declared_order(KIND_OF_AXIS[axis], selector)
 
 
 def _explained(reason: str) -> str:
-    """An error of msgspec, with the valid keys where the key was wrong."""
+    """Explain an error of msgspec, with the valid keys where the key was wrong."""
     if "Invalid enum value" in reason:
         return f"{reason}; valid: {', '.join(SPLITS if 'split' in reason else REFERENCE_MODES)}"
     if "unknown field" not in reason:
@@ -158,7 +158,7 @@ def _explained(reason: str) -> str:
 
 
 class Selection(msgspec.Struct, frozen=True):
-    """What replaces axes of a study; an empty axis stays the study's own."""
+    """Replacements of the axes of a study; an empty axis keeps the study's own."""
 
     formulations: tuple[str, ...] = ()
     scenarios: tuple[str, ...] = ()
@@ -169,10 +169,10 @@ class Selection(msgspec.Struct, frozen=True):
 
 
 def select(base: Study, selection: Selection, *, named: bool) -> Study:
-    """A study with some of its axes replaced.
+    """Return a study with some of its axes replaced.
 
-    A formulation that is given without a solver keeps the solvers that a named study has for it;
-    otherwise it runs with the default solver.
+    Without solvers in the selection, a formulation has the solvers that a named study has for it,
+    else the default solver.
 
     Args:
         base: the study to start from.

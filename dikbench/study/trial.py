@@ -1,4 +1,4 @@
-"""A trial: one cell of the benchmark matrix, from which any process can build what is run."""
+"""A trial: one cell of the benchmark matrix, from which any process can build its parts."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Final
 from dikbench.selector import Selector, parse_selector
 
 NO_SOLVER: Final = Selector("none")
-"""What stands in the place of the solver of a formulation that needs none."""
+"""The solver of a formulation that needs none."""
 
 
 @dataclass(frozen=True)
@@ -18,8 +18,8 @@ class Trial:
     Attributes:
         formulation, scenario, solver, plant: their selectors; the solver is `NO_SOLVER` for a
             formulation that needs none.
-        reference: `time` or `path`: what moves the reference on.
-        seed: of the scenario.
+        reference: `time` or `path`: what advances the reference.
+        seed: seed of the scenario.
     """
 
     formulation: Selector
@@ -55,7 +55,7 @@ class Trial:
 
     @property
     def row(self) -> dict[str, str | int]:
-        """The columns of a table of results that say which trial a row is of."""
+        """The columns of a table of results that identify the trial of a row."""
         return {
             "formulation": str(self.formulation),
             "solver": str(self.solver),

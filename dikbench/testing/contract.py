@@ -1,4 +1,4 @@
-"""The contract that every formulation keeps, as checks for the author of a plug-in.
+"""The contract of formulations, as checks for the author of a plug-in.
 
     @pytest.mark.parametrize("check", dikbench.testing.CHECKS)
     def test_contract(check):
@@ -6,97 +6,34 @@
 
 or, without pytest, `check_formulation(MyLaw())`. A check that fails raises `AssertionError` with
 the robot, the state and what was violated. The states are the same in every run: three arms inside,
-at and outside their limits and at exact singularities, asked for no, an ordinary and a huge twist,
-with and without a posture task, acceleration limits, rows G v <= h and a motion before.
+at and outside their limits and at exact singularities, with a zero, an ordinary and a very large
+desired twist, with and without a posture task, acceleration limits, rows G v <= h and a previous
+velocity.
 """
 
 from __future__ import annotations
 
 import pickle
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import is_dataclass
-from typing import Final, NamedTuple, get_args
+from typing import Final, get_args
 
 import numpy as np
 import pinocchio as pin
 
 from dikbench.arrays import Array
-from dikbench.errors import DikbenchError
 from dikbench.problem.problem import DikProblem, Formulation, LimitKind, program_of, promises_of
 from dikbench.programs.quadratic_program import ProgramKind
-from dikbench.simulation.control_step import TrialEnded, control_step
 from dikbench.simulation.status import Status
-from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, Solver, parse_solver, why_not
-from dikbench.solvers.checked_solve import make_solve
+from dikbench.testing.asked import LIMIT_TOLERANCE_RAD_S, Asked, asked_of
 from dikbench.testing.states import State, states
 
-ROUNDING: Final = 1e-6
-"""A limit passed by less than this [rad/s], beyond the residual of the solver, is kept."""
-
-Check = Callable[[Formulation, str | None], None]
+Check = Callable[[Formulation | Asked, str | None], None]
 
 
-class _Answer(NamedTuple):
-    """What a formulation gave: a velocity, or None and what it did instead; the solver's residual.
-
-    A formulation may solve several programs, each from what the last one gave: their residuals add
-    up.
-    """
-
-    velocity: Array | None
-    status: Status
-    message: str
-    residual: float
-
-
-class _Asked:
-    """A formulation and the solver with which it is checked."""
-
-    def __init__(self, formulation: Formulation, solver: str | None) -> None:
-        self.formulation = formulation
-        self.program = program_of(formulation)
-        self.solver: Solver | None = None
-        if self.program is not None:
-            self.solver = parse_solver(solver or DEFAULT_SOLVER[self.program])
-            reason = why_not(self.solver, self.program)
-            if reason:
-                raise DikbenchError(reason)
-
-    def answer(self, problem: DikProblem) -> _Answer:
-        """Ask the formulation, with a solver that remembers nothing."""
-        solve = make_solve(self.solver, self.program)
-        try:
-            answer = control_step(self.formulation, problem, solve)
-        except TrialEnded as ended:
-            return _Answer(None, ended.status, str(ended), 0.0)
-        if answer.status in {Status.INFEASIBLE, Status.SOLVER_FAILED}:
-            return _Answer(None, answer.status, answer.status.sentence, 0.0)
-        rechecked = solve.rechecked()
-        status = Status.NOT_VERIFIED if rechecked.lied[0] else answer.status
-        residual = solve.calls * float(rechecked.primal[0])
-        return _Answer(answer.velocity, status, status.sentence, residual)
-
-    def verified(self) -> Iterator[tuple[State, Array, float]]:
-        """Yield every state with a verified answer: state, velocity, tolerance [rad/s].
-
-        A formulation may have no answer at some states, and a solver may be wrong at some, but not
-        at all of them.
-        """
-        answered = False
-        why = ""
-        for state in states():
-            answer = self.answer(state.problem)
-            if answer.velocity is not None and answer.status is Status.OK:
-                answered = True
-                yield state, answer.velocity, ROUNDING + answer.residual
-            else:
-                why = f"{state.label}: {answer.status.value}: {answer.message}"
-        if not answered:
-            raise AssertionError(f"no answer at any state; the last one, {why}")
-
-
-def check_declaration(formulation: Formulation, solver: str | None = None) -> None:
+def check_declaration(formulation: Formulation | Asked, solver: str | None = None) -> None:
     """Check that the formulation is a frozen dataclass and that what it declares exists."""
+    formulation = formulation.formulation if isinstance(formulation, Asked) else formulation
     name = type(formulation).__name__
     parameters = getattr(formulation, "__dataclass_params__", None)
     if isinstance(formulation, type) or not is_dataclass(formulation) or not parameters.frozen:
@@ -110,53 +47,52 @@ def check_declaration(formulation: Formulation, solver: str | None = None) -> No
         raise AssertionError(f"{name}.keeps holds {sorted(wrong)}; valid: {valid}")
 
 
-def check_raises_only_cannot_answer(formulation: Formulation, solver: str | None = None) -> None:
+def check_raises_only_cannot_answer(
+    formulation: Formulation | Asked, solver: str | None = None
+) -> None:
     """Check that the formulation answers or raises `CannotAnswer`, and answers somewhere."""
-    asked = _Asked(formulation, solver)
-    for state in states():
-        answer = asked.answer(state.problem)
+    asked = asked_of(formulation, solver)
+    for state, answer in asked.answers:
         if answer.status is Status.FORMULATION_ERROR:
             raise AssertionError(f"{state.label}: raised {answer.message}")
     for _ in asked.verified():
         break
 
 
-def check_shape(formulation: Formulation, solver: str | None = None) -> None:
+def check_shape(formulation: Formulation | Asked, solver: str | None = None) -> None:
     """Check that the velocity is an array of nv floats."""
-    asked = _Asked(formulation, solver)
-    for state in states():
-        answer = asked.answer(state.problem)
+    asked = asked_of(formulation, solver)
+    for state, answer in asked.answers:
         if answer.status is Status.WRONG_SHAPE:
             raise AssertionError(f"{state.label}: wrong shape: {answer.message}")
         if answer.velocity is not None and answer.velocity.dtype != np.float64:
             raise AssertionError(f"{state.label}: expected floats, got {answer.velocity.dtype}")
 
 
-def check_finite(formulation: Formulation, solver: str | None = None) -> None:
+def check_finite(formulation: Formulation | Asked, solver: str | None = None) -> None:
     """Check that the velocity holds neither NaN nor infinity."""
-    asked = _Asked(formulation, solver)
-    for state in states():
-        answer = asked.answer(state.problem)
+    asked = asked_of(formulation, solver)
+    for state, answer in asked.answers:
         if answer.status is Status.NOT_FINITE:
             raise AssertionError(f"{state.label}: not finite: {answer.message}")
 
 
-def check_inputs_untouched(formulation: Formulation, solver: str | None = None) -> None:
+def check_inputs_untouched(formulation: Formulation | Asked, solver: str | None = None) -> None:
     """Check that the formulation leaves everything that it was handed as it was."""
-    asked = _Asked(formulation, solver)
+    asked = asked_of(formulation, solver)
     for state in states():
         before = {name: np.array(value) for name, value in _inputs(state.problem).items()}
         asked.answer(state.problem)
         after = _inputs(state.problem)
         for name in before.keys() | after.keys():
             if name not in before or name not in after:
-                raise AssertionError(f"{state.label}: the law replaced problem.{name}")
+                raise AssertionError(f"{state.label}: the formulation replaced problem.{name}")
             if not np.array_equal(before[name], np.asarray(after[name])):
-                raise AssertionError(f"{state.label}: the law changed problem.{name}")
+                raise AssertionError(f"{state.label}: the formulation changed problem.{name}")
 
 
 def _inputs(problem: DikProblem) -> dict[str, Array | float]:
-    """List the numbers that a formulation is handed, by the name under which it finds them."""
+    """List the inputs of a formulation by their names."""
     found: dict[str, Array | float | None] = {
         "q": problem.q,
         "v_prev": problem.v_prev,
@@ -178,27 +114,29 @@ def _inputs(problem: DikProblem) -> dict[str, Array | float]:
     return {name: value for name, value in found.items() if value is not None}
 
 
-def check_repeatable(formulation: Formulation, solver: str | None = None) -> None:
+def check_repeatable(formulation: Formulation | Asked, solver: str | None = None) -> None:
     """Check that the same problem gives the same velocity to the bit, whatever came in between."""
-    _compare(_Asked(formulation, solver), _Asked(formulation, solver), "asked again")
+    asked = asked_of(formulation, solver)
+    _compare(asked, asked, "asked again")
 
 
-def check_picklable(formulation: Formulation, solver: str | None = None) -> None:
+def check_picklable(formulation: Formulation | Asked, solver: str | None = None) -> None:
     """Check that the formulation can be pickled, and that the copy gives the same velocities."""
+    asked = asked_of(formulation, solver)
     try:
-        unpickled = pickle.loads(pickle.dumps(formulation))
+        unpickled = pickle.loads(pickle.dumps(asked.formulation))
     except Exception as error:
         raise AssertionError(
-            f"{type(formulation).__name__} cannot be pickled ({error}); workers are processes: "
-            "define the class at the top of a module, with parameters that pickle"
+            f"{type(asked.formulation).__name__} cannot be pickled ({error}); workers are "
+            "processes: define the class at the top of a module, with parameters that pickle"
         ) from error
-    _compare(_Asked(formulation, solver), _Asked(unpickled, solver), "unpickled")
+    _compare(asked, Asked(unpickled, asked.selector), "unpickled")
 
 
-def _compare(first: _Asked, second: _Asked, what: str) -> None:
+def _compare(first: Asked, second: Asked, what: str) -> None:
     """Ask one forwards through the states, the other backwards, with other scratch data."""
-    velocities = [first.answer(state.problem).velocity for state in states()]
-    for v, state in reversed([*zip(velocities, states(), strict=True)]):
+    for state, (_, answer) in reversed([*zip(states(), first.answers, strict=True)]):
+        v = answer.velocity
         robot = state.problem.robot
         pin.computeJointJacobians(robot.model, robot.scratch, robot.q0)
         w = second.answer(state.problem).velocity
@@ -207,29 +145,30 @@ def _compare(first: _Asked, second: _Asked, what: str) -> None:
         raise AssertionError(f"{state.label}: gave {v}, {what} {w}")
 
 
-def check_position_limits(formulation: Formulation, solver: str | None = None) -> None:
+def check_position_limits(formulation: Formulation | Asked, solver: str | None = None) -> None:
     """Check, where promised, that q + v dt is inside the position limits, or no further out."""
     _check_promise("position", formulation, solver)
 
 
-def check_velocity_limits(formulation: Formulation, solver: str | None = None) -> None:
+def check_velocity_limits(formulation: Formulation | Asked, solver: str | None = None) -> None:
     """Check, where promised, that v is inside the velocity limits."""
     _check_promise("velocity", formulation, solver)
 
 
-def check_acceleration_limits(formulation: Formulation, solver: str | None = None) -> None:
+def check_acceleration_limits(formulation: Formulation | Asked, solver: str | None = None) -> None:
     """Check, where promised and not relaxed, that (v - v_prev)/dt is inside the limits."""
     _check_promise("acceleration", formulation, solver)
 
 
-def check_inequalities(formulation: Formulation, solver: str | None = None) -> None:
+def check_inequalities(formulation: Formulation | Asked, solver: str | None = None) -> None:
     """Check, where promised, that G v <= h at states where the formulation has an answer."""
     _check_promise("inequalities", formulation, solver)
 
 
-def _check_promise(kind: LimitKind, formulation: Formulation, solver: str | None) -> None:
-    if kind in promises_of(formulation):
-        for state, v, tolerance in _Asked(formulation, solver).verified():
+def _check_promise(kind: LimitKind, formulation: Formulation | Asked, solver: str | None) -> None:
+    asked = asked_of(formulation, solver)
+    if kind in promises_of(asked.formulation):
+        for state, v, tolerance in asked.verified():
             assert_within(state, kind, v, tolerance)
 
 
@@ -280,20 +219,20 @@ def _assert_inequalities(state: State, v: Array, tolerance: float) -> None:
 
 
 def check_state(formulation: Formulation, state: State, solver: str | None = None) -> None:
-    """Check one state of your own: a velocity inside the promised limits, or `CannotAnswer`.
+    """Check one state: a velocity inside the promised limits, or `CannotAnswer`.
 
-    For property-based tests; the answer of a solver that is wrong there is not judged.
+    For property-based tests; an answer that fails the recheck is not checked.
 
     Raises:
         AssertionError: if the formulation raises, answers with a wrong shape or NaN, or breaks a
             promise.
     """
-    answer = _Asked(formulation, solver).answer(state.problem)
+    answer = Asked(formulation, solver).answer(state.problem)
     if answer.status in {Status.FORMULATION_ERROR, Status.WRONG_SHAPE, Status.NOT_FINITE}:
         raise AssertionError(f"{state.label}: {answer.status.value}: {answer.message}")
     if answer.velocity is not None and answer.status is Status.OK:
         for kind in promises_of(formulation):
-            assert_within(state, kind, answer.velocity, ROUNDING + answer.residual)
+            assert_within(state, kind, answer.velocity, LIMIT_TOLERANCE_RAD_S + answer.residual)
 
 
 CHECKS: Final[tuple[Check, ...]] = (
@@ -309,7 +248,9 @@ CHECKS: Final[tuple[Check, ...]] = (
     check_acceleration_limits,
     check_inequalities,
 )
-"""Every check: (formulation, solver's selector or None for the default) -> None."""
+"""Every check: (formulation, solver's selector or None for the default) -> None.
+
+An `Asked` instead of the formulation is asked once for all of them."""
 
 
 def check_formulation(formulation: Formulation, solver: str | None = None) -> None:
@@ -323,5 +264,7 @@ def check_formulation(formulation: Formulation, solver: str | None = None) -> No
         AssertionError: if the formulation breaks its contract.
         DikbenchError: if the solver is unknown or cannot take what the formulation needs solved.
     """
+    check_declaration(formulation, solver)
+    asked = Asked(formulation, solver)
     for check in CHECKS:
-        check(formulation, solver)
+        check(asked, None)

@@ -1,4 +1,4 @@
-"""The control steps on which every formulation is checked: seeded, few, and nasty."""
+"""The control steps on which every formulation is checked: few, seeded and difficult."""
 
 from __future__ import annotations
 
@@ -21,17 +21,16 @@ from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.robot import Robot
 
-DT: Final = 0.01
-"""Control period of every state [s]."""
+CONTROL_PERIOD_S: Final = 0.01
 
-_BEFORE: Final = (
+_MOTION_BEFORE: Final = (
     (False, "unknown"),
     (True, "on course"),
     (False, "at random"),
     (True, "at random"),
     (True, "unknown"),
 )
-"""Whether acceleration limits are in force, and how the robot moved before."""
+"""Whether acceleration limits are in force, and the velocity applied before."""
 
 _PANDA_ELBOW = -(atan(0.0825 / 0.316) + atan(0.0825 / 0.384))
 
@@ -46,17 +45,17 @@ SINGULAR: Final[Mapping[str, tuple[tuple[float, ...], ...]]] = MappingProxyType(
 
 
 class State(NamedTuple):
-    """A control step and what is special about it."""
+    """A control step and its description."""
 
     label: str
     problem: DikProblem
 
 
 def states() -> Iterator[State]:
-    """Make every state, each of new arrays: a formulation that spoils its inputs spoils one.
+    """Make every state, each of new arrays, so that a formulation cannot change another state.
 
     Places (inside, about a limit, singular) are crossed with three speeds; acceleration limits, the
-    motion before, a posture task and rows G v <= h come in turns.
+    previous velocity, a posture task and rows G v <= h alternate.
     """
     for seed, name in enumerate(SINGULAR):
         known = load_robot(name)
@@ -64,8 +63,8 @@ def states() -> Iterator[State]:
         count = 0
         for place, q in _configurations(known, random):
             for speed in (0.0, 0.3, 10.0):  # of the frame [m/s]
-                # The periods 3, 5 and 2 share no factor: every combination comes up.
-                (acceleration, before), posture = _BEFORE[count % 5], count // 5 % 2 == 0
+                # The periods 3, 5 and 2 share no factor: every combination occurs.
+                (acceleration, before), posture = _MOTION_BEFORE[count % 5], count // 5 % 2 == 0
                 robot = replace(known, limits=copy.deepcopy(known.limits), q0=known.q0.copy())
                 if acceleration:
                     robot = robot.with_limits(acceleration=known.available_acceleration)
@@ -83,7 +82,7 @@ def states() -> Iterator[State]:
 
 
 def _configurations(robot: Robot, random: np.random.Generator) -> Iterator[tuple[str, Array]]:
-    """Configurations inside the limits, about one joint's limit, and exactly singular."""
+    """Yield configurations inside the limits, about one limit, and exactly singular."""
     position = robot.limits.position
     assert position is not None
     lower, upper = np.maximum(position.lower, -pi), np.minimum(position.upper, pi)
@@ -105,14 +104,14 @@ def _configurations(robot: Robot, random: np.random.Generator) -> Iterator[tuple
 
 
 def _twist(robot: Robot, random: np.random.Generator, speed: float) -> Array:
-    """A random twist that the arm knows, whose linear part has the given speed [m/s], (6,)."""
+    """Draw a twist (6,) that the arm can make, its linear part of the given speed [m/s]."""
     direction = np.zeros(6)
     direction[list(robot.task_rows)] = random.normal(size=len(robot.task_rows))
     return speed * direction / float(np.linalg.norm(direction[:3]))
 
 
 def _velocity_before(problem: DikProblem, before: str, random: np.random.Generator) -> Array | None:
-    """A velocity inside the velocity limits to have been applied last, (nv,) [rad/s], or None."""
+    """Draw the velocity applied last, inside the limits, (nv,) [rad/s]; or None."""
     if before == "unknown":
         return None
     robot, task = problem.robot, problem.tasks[0]
@@ -124,11 +123,11 @@ def _velocity_before(problem: DikProblem, before: str, random: np.random.Generat
         return spread * fastest
     v = np.linalg.pinv(task.J, rcond=1e-6) @ task.V
     v /= max(1.0, 2 * float(np.max(np.abs(v) / fastest)))
-    return v + 0.5 * DT * spread * robot.available_acceleration
+    return v + 0.5 * CONTROL_PERIOD_S * spread * robot.available_acceleration
 
 
 def _rows(problem: DikProblem, random: np.random.Generator) -> tuple[Array, Array]:
-    """Half-spaces that cut the velocity box, their normals of unit length; some of it is left."""
+    """Draw half-spaces that cut the velocity box and leave some of it, of unit normals."""
     box = velocity_box(problem.limits, problem.v_prev, problem.dt)
     inside = np.clip(np.zeros(problem.robot.nv), box.lower, box.upper)
     G = random.normal(size=(3, problem.robot.nv))
@@ -137,11 +136,11 @@ def _rows(problem: DikProblem, random: np.random.Generator) -> tuple[Array, Arra
 
 
 def _problem(robot: Robot, q: Array, twist: Array, *, posture: bool) -> DikProblem:
-    """The control step in which the frame is to move with a twist towards a target."""
+    """Pose the control step in which the frame is to move with a twist to a target."""
     kinematics = Kinematics(robot)
     kinematics.update(q.copy())
-    # Less than half a turn away, so that the logarithm gives the twist back.
-    target = kinematics.placement(robot.frame_id) * pin.exp6(twist * DT)
-    pose = PoseTask(target=target, gain=1 / DT).linearize(kinematics)
+    # Less than half a turn away, so that the logarithm gives the twist.
+    target = kinematics.placement(robot.frame_id) * pin.exp6(twist * CONTROL_PERIOD_S)
+    pose = PoseTask(target=target, gain=1 / CONTROL_PERIOD_S).linearize(kinematics)
     others = [PostureTask(robot.q0, weight=0.01)] if posture else []
-    return pose_problem(kinematics, None, DT, pose, others)
+    return pose_problem(kinematics, None, CONTROL_PERIOD_S, pose, others)

@@ -1,4 +1,4 @@
-"""What moves in a replay, as keyframes that the browser plays."""
+"""The motion of a replay, as keyframes for the browser."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from dikbench.viewer.limit_use import Nearness
 from dikbench.viewer.recording import Recording
 
 FRAMES_PER_SECOND: Final = 50
-"""Of the replay; the browser interpolates between them."""
+"""Keyframes of the replay; the browser interpolates between them."""
 
 
 @dataclass(frozen=True, eq=False)
 class Moving:
-    """What moves, before each of n control steps and after the last.
+    """A recorded motion before each of n control steps and after the last.
 
     Attributes:
         dt: control period [s].
         q: configurations, (n + 1, nq).
         tips: placements of the task frame in the world (`pinocchio.SE3`), n + 1.
-        targets: of the reference, at the instants that the run had come to, n + 1.
+        targets: placements of the reference, n + 1.
         joints: origins of the joints in the world, (n + 1, joints, 3) [m].
-        nearness: of each joint to its limits, (n + 1, joints).
+        nearness: nearness of each joint to its limits, (n + 1, joints).
     """
 
     dt: float
@@ -40,7 +40,7 @@ class Moving:
 
     @classmethod
     def of(cls, recording: Recording, nearness: npt.NDArray[np.int_]) -> Self:
-        """The motion of a recording; the nearness is given per velocity, (n + 1, nv)."""
+        """Compute the motion of a recording; the nearness is given per velocity, (n + 1, nv)."""
         robot, trace = recording.scenario.robot, recording.trace
         model, data = robot.model, robot.model.createData()
         tips, origins = [], []
@@ -61,13 +61,13 @@ class Moving:
 
 
 def animation(viewer: Any, view: Any, moving: Moving, speed: float) -> Any:
-    """The keyframes of a replay (`meshcat.animation.Animation`).
+    """Build the keyframes of a replay (`meshcat.animation.Animation`).
 
     Args:
         viewer: the `meshcat.Visualizer`, with the nodes `target`, `tool` and `joints`.
         view: the `MeshcatVisualizer` of the robot.
-        moving: what moves.
-        speed: of the replay, over the robot's.
+        moving: the motion.
+        speed: speed of the replay over the robot's.
     """
     last = len(moving.q) - 1
     stride = max(1, round(speed / (moving.dt * FRAMES_PER_SECOND)))

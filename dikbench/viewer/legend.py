@@ -1,4 +1,4 @@
-"""What is seen in a replay, and in which colours."""
+"""The legend of a replay and its colours."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from dikbench.viewer.limit_use import NEAR_SHARE, Nearness
 from dikbench.viewer.recording import Recording
 
 COLOURS: Final = {Nearness.INSIDE: 0x009E73, Nearness.NEAR: 0xF0C000, Nearness.PAST: 0xC00030}
-"""Of joints and of the path of the task frame; they differ in brightness too."""
+"""Colours of joints and of the path of the task frame; they differ in brightness, too."""
 
-WANTED: Final = 0x0072B2
+TARGET_COLOUR: Final = 0x0072B2
 """Colour of the path of the target."""
 
 LEGEND: Final = (
-    (WANTED, "blue: path of the target, whose axes are the large ones (x red, y green, z blue)"),
+    (TARGET_COLOUR, "blue: path of the target, with the large axes (x red, y green, z blue)"),
     (COLOURS[Nearness.INSIDE], "green: path of the task frame, joints; inside all limits"),
     (COLOURS[Nearness.NEAR], f"yellow: from {100 * NEAR_SHARE:.0f} % of a position or speed limit"),
     (COLOURS[Nearness.PAST], "red: past a limit"),
 )
-"""Colours, and what they mean."""
+"""Colours and their meaning."""
 
 
 def captions(recording: Recording, speed: float) -> list[str]:
-    """What is replayed, in lines."""
+    """Say what is replayed, in lines."""
     trial, trace = recording.trial, recording.trace
     solver = "" if trial.solver == NO_SOLVER else f" with {trial.solver}"
     ended = "" if recording.status == Status.OK.value else f", ended {recording.status}"

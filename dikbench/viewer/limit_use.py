@@ -1,4 +1,4 @@
-"""How near every joint is to its limits at every control step."""
+"""The nearness of every joint to its limits at every control step."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from dikbench.robots.limits import JointLimits
 from dikbench.simulation.trace import Trace
 
 NEAR_SHARE: Final = 0.9
-"""From this share of a limit on a joint is called near it."""
+"""Share of a limit from which a joint counts as near it."""
 
 
 class Nearness(IntEnum):
-    """Where a joint is with regard to the limits on its position and its speed."""
+    """The relation of a joint to the limits of its position and speed."""
 
     INSIDE = 0
     NEAR = 1
@@ -26,9 +26,9 @@ class Nearness(IntEnum):
 
 
 def nearness(trace: Trace, limits: JointLimits) -> npt.NDArray[np.int_]:
-    """The nearness of every joint, (n + 1, nv): before each step, with its speed, and at the end.
+    """Classify every joint, (n + 1, nv): before each step, with its speed, and at the end.
 
-    A joint is past a limit where it is so by more than `VIOLATION_TOLERANCE`, as in the metrics.
+    A joint is past a limit if it exceeds it by more than `VIOLATION_TOLERANCE`, as in the metrics.
     """
     use, excess = np.zeros((2, trace.steps + 1, limits.nv))
     position, speed = limits.position, limits.velocity
@@ -46,7 +46,7 @@ def nearness(trace: Trace, limits: JointLimits) -> npt.NDArray[np.int_]:
 
 
 def _share_of_range(at: Array, lower: Array, upper: Array) -> Array:
-    """Distance from the middle of a joint's range over half of it; 0 where it is unbounded."""
+    """Compute the distance from mid-range over half the range; 0 where it is unbounded."""
     with np.errstate(invalid="ignore"):  # infinity minus infinity
         middle, half = (lower + upper) / 2, (upper - lower) / 2
         share = np.abs(at - middle) / half

@@ -1,4 +1,4 @@
-"""A trial in the browser, or in a file that needs nothing but one."""
+"""A trial in the browser, or in an HTML file."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from dikbench.errors import DikbenchError
 from dikbench.viewer.legend import LEGEND, captions
 from dikbench.viewer.recording import Recording
 
-PANE: Final = '<div style="position:fixed;left:1em;top:1em;font:14px sans-serif">{}</div>'
-SWATCH: Final = '<p><span style="background:#{:06X}">&emsp;</span> {}</p>'
+PANE_HTML: Final = '<div style="position:fixed;left:1em;top:1em;font:14px sans-serif">{}</div>'
+SWATCH_HTML: Final = '<p><span style="background:#{:06X}">&emsp;</span> {}</p>'
 
 
 def write_replay(recording: Recording, speed: float, file: Path) -> None:
@@ -27,9 +27,9 @@ def write_replay(recording: Recording, speed: float, file: Path) -> None:
     with _scene(recording, speed) as viewer:
         page = viewer.static_html()
     told = "".join(f"<p>{html.escape(line)}</p>" for line in captions(recording, speed))
-    told += "".join(SWATCH.format(colour, text) for colour, text in LEGEND)
+    told += "".join(SWATCH_HTML.format(colour, text) for colour, text in LEGEND)
     page = page.replace("<title>MeshCat</title>", f"<title>{recording.id}</title>")
-    page = page.replace("</body>", f"{PANE.format(told)}</body>")
+    page = page.replace("</body>", f"{PANE_HTML.format(told)}</body>")
     try:
         file.write_text(page, encoding="utf-8")
     except OSError as error:
@@ -54,14 +54,14 @@ def serve_replay(recording: Recording, speed: float) -> None:
 
 @contextmanager
 def _scene(recording: Recording, speed: float) -> Iterator[Any]:
-    """A viewer with its server, filled with a recording; the server is ended after it."""
+    """Start a viewer filled with a recording, and end its server afterwards."""
     try:
         import meshcat
     except ImportError:
         raise DikbenchError("a replay needs meshcat: pip install 'dikbench[replay]'") from None
     from dikbench.viewer.scene import build_scene
 
-    with redirect_stdout(StringIO()):  # it prints its address, which we do ourselves where it helps
+    with redirect_stdout(StringIO()):  # meshcat prints its address
         viewer = meshcat.Visualizer()
     try:
         build_scene(viewer, recording, speed)

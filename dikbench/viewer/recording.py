@@ -1,4 +1,4 @@
-"""Finding the record of one trial: its row, its trace, its scenario."""
+"""The record of one trial: its row, its trace, its scenario."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from dikbench.simulation.trace import Trace
 from dikbench.study.identity import trial_id
 from dikbench.study.trial import Trial
 
-NAMED: Final = 5
-"""So many trials are named where an id is not unique."""
+TRIALS_NAMED: Final = 5
+"""Trials that are named where the beginning of an id is not unique."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,11 +26,11 @@ class Recording:
     """One trial as it was recorded.
 
     Attributes:
-        id: of the trial.
+        id: id of the trial.
         trial: its selectors.
-        status: how it ended.
-        trace: what happened.
-        scenario: the case, built anew.
+        status: its status.
+        trace: its trace.
+        scenario: its scenario, built again.
     """
 
     id: str
@@ -78,7 +78,7 @@ def find_recording(text: str, results: Path | None = None) -> Recording:
 
 
 def newest_results(runs: Path) -> Path:
-    """The folder below `runs` whose results were written last.
+    """Return the folder below `runs` whose results were written last.
 
     Raises:
         DikbenchError: if there is none.
@@ -96,6 +96,6 @@ def newest_results(runs: Path) -> Path:
 def _which(text: str, found: list[Any], folder: Path) -> str:
     if not found:
         return f"no trial of {folder} has an id that begins with {text!r}; {TRIALS} has them all"
-    names = ", ".join(row["id"] for row in found[:NAMED])
-    more = ", ..." if len(found) > NAMED else ""
+    names = ", ".join(row["id"] for row in found[:TRIALS_NAMED])
+    more = ", ..." if len(found) > TRIALS_NAMED else ""
     return f"{len(found)} trials of {folder} begin with {text!r}: {names}{more}"

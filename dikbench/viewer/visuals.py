@@ -1,39 +1,39 @@
-"""What is drawn of a robot: its meshes, or capsules from joint to joint."""
+"""The visual geometry of a robot: its meshes, or capsules from joint to joint."""
 
 from __future__ import annotations
 
 from typing import Any, Final
 
-import coal
 import numpy as np
 import pinocchio as pin
 
+from dikbench.robots.collision.obstacles import capsule
 from dikbench.robots.robot import Robot
 
-GREY: Final = (0.62, 0.66, 0.71, 1.0)
+GREY_RGBA: Final = (0.62, 0.66, 0.71, 1.0)
 
-THICKNESS: Final = 0.02
+CAPSULE_RADIUS_SHARE: Final = 0.02
 """Radius of a capsule, as a share of the arm's length."""
 
 
 def bodies(robot: Robot) -> Any:
-    """The robot's own geometry if it has any, else capsules (`pinocchio.GeometryModel`)."""
+    """Return the robot's own geometry, else capsules (`pinocchio.GeometryModel`)."""
     if robot.visuals is not None:
         try:
             visuals = robot.visuals()
-        except ValueError:  # a URDF whose meshes are elsewhere
+        except ValueError:  # a URDF without its meshes
             return capsules(robot)
         for body in visuals.geometryObjects:
             if body.meshPath.lower().endswith(".dae"):
                 # Browsers lose parts with several materials: send triangles, which are scaled.
                 body.meshPath, body.meshScale = "", np.ones(3)
-                body.meshColor = np.array(GREY)
+                body.meshColor = np.array(GREY_RGBA)
         return visuals
     return capsules(robot)
 
 
 def capsules(robot: Robot) -> Any:
-    """A capsule from the base to the first joint, on to each next one, and to the task frame."""
+    """Build capsules from the base through the joints to the task frame."""
     model, geometry = robot.model, pin.GeometryModel()
     tip = model.frames[robot.frame_id]
     ends = [
@@ -43,13 +43,12 @@ def capsules(robot: Robot) -> Any:
     ]
     ends.append((tip.parentJoint, tip.placement.translation))
     lengths = [float(np.linalg.norm(end)) for _, end in ends]
-    radius = THICKNESS * sum(lengths)
+    radius = CAPSULE_RADIUS_SHARE * sum(lengths)
     for number, ((joint, end), length) in enumerate(zip(ends, lengths, strict=True)):
         if length == 0:
             continue
-        along = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), end / length)
-        placement = pin.SE3(along.matrix(), end / 2)
-        link = pin.GeometryObject(f"link{number}", joint, placement, coal.Capsule(radius, length))
-        link.meshColor = np.array(GREY)
+        shape, placement = capsule(np.zeros(3), end, radius)
+        link = pin.GeometryObject(f"link{number}", joint, placement, shape)
+        link.meshColor = np.array(GREY_RGBA)
         geometry.addGeometryObject(link)
     return geometry

@@ -18,7 +18,8 @@ def random_matrix(seed: int, m: int, n: int, rank: int) -> Array:
     """A matrix (m, n) of a given rank, its other singular values between 0.1 and 2."""
     random = np.random.default_rng(seed)
     U, V = (np.linalg.qr(random.normal(size=(size, size)))[0] for size in (m, n))
-    return U[:, :rank] * random.uniform(0.1, 2, rank) @ V[:, :rank].T
+    A: Array = U[:, :rank] * random.uniform(0.1, 2, rank) @ V[:, :rank].T
+    return A
 
 
 SHAPES = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 from math import inf, isfinite, nan
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 import pytest
@@ -156,12 +156,15 @@ def test_a_new_default_keeps_the_range_of_the_base() -> None:
         ({"share": nan}, "share=nan must be a number"),
     ],
 )
-def test_values_that_are_refused(values: dict[str, object], message: str) -> None:
+def test_values_that_are_refused(values: dict[str, Any], message: str) -> None:
     """When the object is made, and when a field of it is replaced."""
-    for make in (lambda: Filter(**values), lambda: dataclasses.replace(Filter(), **values)):
-        with pytest.raises(DikbenchError) as caught:
-            make()
-        assert str(caught.value) == message
+    made = Filter()
+    with pytest.raises(DikbenchError) as caught:
+        Filter(**values)
+    assert str(caught.value) == message
+    with pytest.raises(DikbenchError) as caught:
+        dataclasses.replace(made, **values)
+    assert str(caught.value) == message
 
 
 def test_what_spans_several_parameters_is_checked_after_each_by_itself() -> None:
@@ -216,10 +219,7 @@ def test_a_missing_decorator_is_refused() -> None:
 def test_a_type_on_a_class_variable_is_refused() -> None:
     """It would become a parameter; without a type it is set."""
     with pytest.raises(DikbenchError, match="Mine: kind is a class variable, no parameter"):
-
-        @dataclass(frozen=True)
-        class Mine(Filter):
-            kind: str = "cubic"
+        type("Mine", (Filter,), {"__annotations__": {"kind": "str"}, "kind": "cubic"})
 
     @dataclass(frozen=True)
     class Cubic(Filter):
@@ -301,7 +301,7 @@ def test_what_families_declare_for_figures_are_numbers_of_theirs() -> None:
     grids = 0
     for plugin in plugins("scenario").values():
         assert issubclass(plugin.factory, Family)
-        for name in (*plugin.factory.swept, *(plugin.factory.grid or ())):
+        for name in plugin.factory.grid or ():
             assert plugin.parameters[name].range is not None
         grids += plugin.factory.grid is not None
     assert grids == 1

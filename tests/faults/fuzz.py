@@ -14,7 +14,7 @@ import pytest
 
 
 def main() -> None:
-    """Run the tests of `tests/dikbench/test_fuzz.py` with more examples."""
+    """Run the tests of `tests/dikbench/cli/test_fuzz.py` with more examples."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--examples", type=int, default=10_000)
     os.environ["DIKBENCH_FUZZ"] = str(parser.parse_args().examples)

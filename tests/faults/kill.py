@@ -22,7 +22,7 @@ from pathlib import Path
 import pandas as pd
 
 from dikbench.results.columns import TIMES
-from dikbench.results.folder import ResultsFolder
+from dikbench.results.reading import load_results
 
 ARGUMENTS = [
     "run", "--plant", "ideal", "--seed", "0", "--seed", "1", "--seed", "2",
@@ -56,7 +56,7 @@ def children(process: int) -> list[int]:
 
 def table(out: Path) -> pd.DataFrame:
     """Every column that must be equal."""
-    return ResultsFolder(out).read()[0].drop(columns=TIMELESS)
+    return load_results(out).trials.drop(columns=TIMELESS)
 
 
 def counted(out: Path) -> tuple[int, int]:

@@ -11,7 +11,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from dikbench.results.folder import ResultsFolder
+from dikbench.results.reading import load_results
 from dikbench.run.runner import RunSettings, run_study
 from dikbench.study.plan import expand
 from dikbench.study.study import Cells, Study
@@ -49,7 +49,7 @@ def main() -> None:
             out = Path(folder) / "out"
             run_study(study_of(count), out, RunSettings(jobs=2, traces="none"), "overhead")
             wall = time.perf_counter() - begun
-            busy = float(ResultsFolder(out).read()[0]["wall_time_s"].sum())
+            busy = float(load_results(out).trials["wall_time_s"].sum())
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         print(
             f"{len(planned)} trials: expanded in {expanding:.2f} s, run in {wall:.1f} s, of it "

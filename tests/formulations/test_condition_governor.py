@@ -3,40 +3,27 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from makers.problems import equation, kinematics_at, problem_at, task_jacobian, velocity_of
 
-from dikbench import DikProblem, LinearizedTask, PostureTask, Robot, load_robot
+from dikbench import PostureTask, Robot, load_robot
 from dikbench.arrays import Array
-from dikbench.plugins.building import make_formulation
-from dikbench.robots.kinematics import Kinematics
-from dikbench.solvers.checked_solve import make_solve
 from dikbench.testing.states import SINGULAR
 
 PLAIN = "condition-governor[after=none]"
 ARMS = ("panda", "ur5", "planar3r")
 
 
-def jacobian(robot: Robot, q: Array) -> Array:
-    """Task Jacobian, computed afresh."""
-    J: Array = pin.computeFrameJacobian(
-        robot.model, robot.model.createData(), q, robot.frame_id, pin.LOCAL
-    )[list(robot.task_rows)]
-    return J
-
-
 def condition(robot: Robot, q: Array) -> float:
     """Largest over smallest singular value of the task Jacobian."""
-    return float(np.linalg.cond(jacobian(robot, q)))
+    return float(np.linalg.cond(task_jacobian(robot, q)))
 
 
 def answer(robot: Robot, q: Array, V: Array, law: str = PLAIN) -> Array:
     """What the law gives for a twist V of the task frame."""
-    task = LinearizedTask(jacobian(robot, q), V, np.zeros(len(V)))
-    problem = DikProblem(robot, q, None, 0.01, [task], robot.limits.at(q))
-    return make_formulation(law).velocity(problem, make_solve(None, None))
+    return velocity_of(law, problem_at(robot, q, [equation(task_jacobian(robot, q), V)]))
 
 
 def beside_wrist(angle: float) -> Array:
@@ -62,7 +49,7 @@ def test_approach_is_slowed_down_and_stopped_and_leaving_is_not(kappa: float, sc
     """Straight into the UR5's wrist singularity: 1 up to 17, 0 from 30, a line between them."""
     robot, q = load_robot("ur5"), conditioned(kappa)
     v = np.array([0, 0, 0, 0, -0.3, 0])
-    into, out = (answer(robot, q, jacobian(robot, q) @ (sign * v)) for sign in (1, -1))
+    into, out = (answer(robot, q, task_jacobian(robot, q) @ (sign * v)) for sign in (1, -1))
     np.testing.assert_allclose(into, scale * v, atol=1e-6)
     np.testing.assert_allclose(out, -v, atol=1e-12)
 
@@ -75,7 +62,7 @@ def test_slows_down_exactly_where_the_condition_number_grows(name: str, seed: in
     robot, random = load_robot(name), np.random.default_rng(seed)
     q = robot.q0 + random.uniform(-0.8, 0.8, robot.nv)
     V, kappa = random.normal(size=len(robot.task_rows)), condition(robot, q)
-    plain = np.linalg.pinv(jacobian(robot, q)) @ V
+    plain = np.linalg.pinv(task_jacobian(robot, q)) @ V
     step = 1e-5 * plain / np.linalg.norm(plain)
     growth = condition(robot, q + step) - condition(robot, q - step)
     if abs(growth) < 1e-6 * kappa:
@@ -91,7 +78,7 @@ def test_a_singular_posture_can_be_left(name: str) -> None:
     robot, random = load_robot(name), np.random.default_rng(0)
     for posture in SINGULAR[name]:
         q = np.array(posture, dtype=float)
-        J, V = jacobian(robot, q), random.normal(size=len(robot.task_rows))
+        J, V = task_jacobian(robot, q), random.normal(size=len(robot.task_rows))
         np.testing.assert_allclose(
             answer(robot, q, V), np.linalg.pinv(J, rcond=1e-8) @ V, atol=1e-9
         )
@@ -102,13 +89,13 @@ def test_locks_on_the_way_in_and_not_on_the_way_out() -> None:
     robot, q = load_robot("ur5"), conditioned(16.0)
     wanted, speeds = np.array([0, 0, 0, 0, -0.5, 0]), []
     for _ in range(400):
-        v = answer(robot, q, jacobian(robot, q) @ wanted)
+        v = answer(robot, q, task_jacobian(robot, q) @ wanted)
         speeds.append(float(np.linalg.norm(v)))
         q = q + 0.01 * v
     assert 29.5 < condition(robot, q) < 30
     assert speeds[-1] < 1e-3 < 0.4 < speeds[0]
     for _ in range(50):
-        v = answer(robot, q, jacobian(robot, q) @ -wanted)
+        v = answer(robot, q, task_jacobian(robot, q) @ -wanted)
         np.testing.assert_allclose(v, -wanted, atol=1e-9)
         q = q + 0.01 * v
     assert condition(robot, q) < 16
@@ -117,7 +104,7 @@ def test_locks_on_the_way_in_and_not_on_the_way_out() -> None:
 def test_leaving_is_scaled_into_the_velocity_limits() -> None:
     """What the inverse asks for beside the singularity is cut to the fastest joint, on course."""
     robot, q = load_robot("ur5"), beside_wrist(1e-3)
-    U = np.linalg.svd(jacobian(robot, q))[0]
+    U = np.linalg.svd(task_jacobian(robot, q))[0]
     limit = robot.limits.velocity
     assert limit is not None
     fastest = [
@@ -134,11 +121,9 @@ def test_leaving_is_scaled_into_the_velocity_limits() -> None:
 def test_the_arms_own_jacobian_decides_whatever_the_task() -> None:
     """A posture as the primary task is slowed down on the way into the singularity too."""
     robot, q = load_robot("ur5"), conditioned(23.5)
-    kinematics = Kinematics(robot)
-    kinematics.update(q)
+    kinematics = kinematics_at(robot, q)
     for sign, scale in ((1, 0.5), (-1, 1.0)):
         away = np.array([0, 0, 0, 0, -0.2 * sign, 0])
         task = PostureTask(q + away, priority=1).linearize(kinematics)
-        problem = DikProblem(robot, q, None, 0.01, [task], robot.limits.at(q))
-        v = make_formulation(PLAIN).velocity(problem, make_solve(None, None))
+        v = velocity_of(PLAIN, problem_at(robot, q, [task]))
         np.testing.assert_allclose(v, scale * away, atol=1e-6)

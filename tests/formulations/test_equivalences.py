@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import functools
-
 import numpy as np
 import pinocchio as pin
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
+from makers.problems import equation, planar_robot, problem_of, velocity_of
 from scipy.optimize import lsq_linear
 
 from dikbench import (
-    LinearizedTask,
     PoseTask,
     PostureTask,
     Robot,
@@ -23,13 +21,9 @@ from dikbench import (
     solve_dik,
 )
 from dikbench.arrays import Array
-from dikbench.plugins.building import make_formulation
-from dikbench.problem import DikProblem, Formulation
+from dikbench.problem import Formulation
 from dikbench.robots.kinematics import Kinematics, smallest_singular_value
-from dikbench.robots.planar_arm import planar_arm
-from dikbench.robots.robot import model_limits
 from dikbench.solvers.catalogue.back_ends import BACK_ENDS, is_installed
-from dikbench.solvers.checked_solve import make_solve
 
 ARMS = ("panda", "ur5", "planar3r")
 TIGHT = {
@@ -62,24 +56,13 @@ def random_states(robot: Robot, count: int, seed: int = 0) -> list[tuple[Array, 
     return found
 
 
-@functools.cache
-def two_joints() -> Robot:
-    """An arm of two joints whose limits are far away."""
-    model = planar_arm((1.0, 1.0), velocity_limits=(1e6, 1e6))
-    return Robot("planar2r", model, "tip", model_limits(model), np.array([0.4, 0.8]), (0, 1))
-
-
-def problem_of(J: Array, V: Array) -> DikProblem:
-    """The control step with one task, given in numbers (for laws that look at nothing else)."""
-    robot = two_joints()
-    tasks = [LinearizedTask(J, V, np.zeros(len(V)))]
-    return DikProblem(robot, robot.q0, None, 0.01, tasks, robot.limits.at(robot.q0))
+TWO_JOINTS = planar_robot(1.0, 1.0, velocity=1e6)
+"""An arm whose limits are far away."""
 
 
 def answer(law: str | Formulation, J: Array, V: Array) -> Array:
     """What a law that needs no solver gives for J v = V."""
-    formulation = make_formulation(law) if isinstance(law, str) else law
-    return formulation.velocity(problem_of(J, V), make_solve(None, None))
+    return velocity_of(law, problem_of(equation(J, V), robot=TWO_JOINTS))
 
 
 @pytest.mark.parametrize("damping", [0.003, 0.05, 0.5])
@@ -233,7 +216,7 @@ def test_tight_solvers_agree_with_an_active_set_method(name: str) -> None:
         qp = solve_dik(robot, q, formulation=law, twist=3 * twist, solver=TIGHT[name])
         assert qp.status is Status.OK
         np.testing.assert_allclose(qp.velocity, reference, rtol=0, atol=2e-4)
-        active += np.count_nonzero(np.abs(reference) > limit - 1e-9)
+        active += int(np.count_nonzero(np.abs(reference) > limit - 1e-9))
     assert active > 10  # else any least squares would do
 
 

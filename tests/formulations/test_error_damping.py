@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from makers.problems import problem_of, velocity_of
 
-from dikbench import DikProblem, LinearizedTask, QuadraticProgram, load_robot
+from dikbench import LinearizedTask, QuadraticProgram
 from dikbench.arrays import Array
 from dikbench.plugins.building import make_formulation
 from dikbench.solvers.catalogue.back_ends import parse_solver
@@ -24,10 +25,7 @@ STEPS: list[dict[str, Any]] = json.loads(
 
 def answer(law: str, J: Array, V: Array, error: Array, weight: float | Array = 1.0) -> Array:
     """What a law gives for one task."""
-    robot = load_robot("planar3r")
-    task = LinearizedTask(J, V, error, weight)
-    problem = DikProblem(robot, robot.q0, None, 0.01, [task], robot.limits.at(robot.q0))
-    return make_formulation(law).velocity(problem, make_solve(None, None))
+    return velocity_of(law, problem_of(LinearizedTask(J, V, error, weight)))
 
 
 @given(

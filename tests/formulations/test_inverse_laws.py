@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
+from makers.problems import equation, problem_of, velocity_of
 
-from dikbench import DikProblem, LinearizedTask, load_robot
+from dikbench import load_robot
 from dikbench.arrays import Array
 from dikbench.plugins.building import make_formulation
 from dikbench.robots.kinematics import Kinematics
-from dikbench.solvers.checked_solve import make_solve
 from dikbench.testing.states import SINGULAR
 
 SHAPES = ((6, 7), (6, 6), (3, 3), (2, 5), (8, 5))
@@ -24,19 +24,11 @@ SPECTRA = {
     "two nearly lost": np.array([1.9, 1.5, 1.1, 0.8, 0.03, 0.004]),
     "one lost": np.array([1.9, 1.5, 1.1, 0.8, 0.5, 0.0]),
 }
-NO_SOLVER = make_solve(None, None)
-
-
-def problem_of(*tasks: LinearizedTask) -> DikProblem:
-    """A control step with tasks given in numbers, for laws that look at nothing else."""
-    robot = load_robot("planar3r")
-    return DikProblem(robot, robot.q0, None, 0.01, [*tasks], robot.limits.at(robot.q0))
 
 
 def answer(law: str, J: Array, V: Array) -> Array:
     """What a law gives for J v = V."""
-    problem = problem_of(LinearizedTask(J, V, np.zeros(len(V))))
-    return make_formulation(law).velocity(problem, NO_SOLVER)
+    return velocity_of(law, problem_of(equation(J, V)))
 
 
 def with_spectrum(
@@ -62,12 +54,14 @@ def numerical(s: Array) -> Array:
 
 def isotropic(s: Array) -> Array:
     """Gains with the same damping in every direction, and 0.01 beside."""
-    return s / (s**2 + 0.01**2 + max(0.0, 1 - (s[-1] / 0.04) ** 2) * 0.08**2)
+    added = max(0.0, 1 - float(s[-1] / 0.04) ** 2) * 0.08**2
+    return s / (s**2 + 0.01**2 + added)
 
 
 def by_manipulability(s: Array) -> Array:
     """Gains of the damping that the product of the singular values switches on."""
-    return s / (s**2 + 0.1**2 * max(0.0, 1 - np.prod(s) / 0.02) ** 2)
+    share = max(0.0, 1 - float(np.prod(s)) / 0.02)
+    return s / (s**2 + 0.1**2 * share**2)
 
 
 def filtered(s: Array) -> Array:
@@ -130,7 +124,7 @@ def test_switched_laws_are_the_pseudo_inverse_away_from_singularities(law: str, 
 def regular_states(name: str, count: int) -> list[tuple[Array, Array]]:
     """Task Jacobians of a robot whose singular values are all above 0.06, with random twists."""
     robot, random = load_robot(name), np.random.default_rng(5)
-    kinematics, found = Kinematics(robot), []
+    kinematics, found = Kinematics(robot), list[tuple[Array, Array]]()
     while len(found) < count:
         kinematics.update(robot.q0 + random.uniform(-1, 1, robot.nv))
         J = kinematics.jacobian(robot.frame_id)[list(robot.task_rows)]

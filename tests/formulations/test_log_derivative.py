@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
+from makers.problems import kinematics_at, problem_at, velocity_of
 
 from dikbench import DikProblem, PoseTask, Robot, load_robot
 from dikbench.arrays import Array
 from dikbench.robots.kinematics import Kinematics
-from dikbench.solvers.catalogue.back_ends import parse_solver
-from dikbench.solvers.checked_solve import make_solve
 from formulations.weighted_qp import WeightedQp
 
 WEIGHTS = np.array([1.0, 2.0, 0.5, 0.1, 0.3, 0.05])
@@ -23,16 +22,15 @@ def random_placement(random: np.random.Generator, angle: float) -> pin.SE3:
     return pin.SE3(rotation, random.uniform(-1, 1, 3))
 
 
-def pose_problem(
+def towards(
     robot: Robot, q: Array, relative: pin.SE3, weight: float | Array = 1.0
 ) -> tuple[DikProblem, Array]:
     """The control step towards a target seen from the frame, without limits; and its Jacobian."""
     robot = robot.with_limits(position=None, velocity=None)
-    kinematics = Kinematics(robot)
-    kinematics.update(q)
+    kinematics = kinematics_at(robot, q)
     target = kinematics.placement(robot.frame_id) * relative
     task = PoseTask(target, gain=1.0, weight=weight).linearize(kinematics)
-    problem = DikProblem(robot, q, None, 0.01, [task], robot.limits.at(q))
+    problem = problem_at(robot, q, [task])
     return problem, pin.computeFrameJacobian(
         robot.model, robot.scratch, q, robot.frame_id, pin.LOCAL
     )
@@ -41,7 +39,7 @@ def pose_problem(
 def qp_velocity(problem: DikProblem, damping: float, *, log_derivative: bool) -> Array:
     """What the quadratic program gives."""
     law = WeightedQp(damping=damping, log_derivative=log_derivative)
-    return law.velocity(problem, make_solve(parse_solver("daqp"), "qp"))
+    return velocity_of(law, problem)
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-4, 0.5, 2.0, 3.0, np.pi - 1e-3, np.pi - 1e-5])
@@ -72,6 +70,7 @@ def test_log_derivative_is_the_derivative_of_the_error(name: str) -> None:
         for sign in (-1, 1):
             kinematics.update(pin.integrate(robot.model, q, sign * step * v))
             errors.append(PoseTask(target).linearize(kinematics).error)
+        assert task.log_derivative is not None
         difference = (errors[1] - errors[0]) / (2 * step)
         np.testing.assert_allclose(difference, -task.log_derivative @ task.J @ v, atol=1e-6)
 
@@ -83,7 +82,7 @@ def test_closed_form_with_log_derivative(added: float) -> None:
     random = np.random.default_rng(2)
     for _ in range(20):
         relative = random_placement(random, random.uniform(0.1, 2.5))
-        problem, J = pose_problem(robot, robot.q0 + random.uniform(-0.2, 0.2, 6), relative, WEIGHTS)
+        problem, J = towards(robot, robot.q0 + random.uniform(-0.2, 0.2, 6), relative, WEIGHTS)
         e = pin.log6(relative).np
         Jl_inverse = np.linalg.inv(pin.Jlog6(relative.inverse()))
         leak = Jl_inverse @ np.diag(1 / WEIGHTS) @ Jl_inverse.T @ np.linalg.inv(J).T
@@ -99,7 +98,7 @@ def test_closed_form_without_log_derivative(added: float) -> None:
     random = np.random.default_rng(3)
     for _ in range(20):
         relative = random_placement(random, random.uniform(0.1, 2.5))
-        problem, J = pose_problem(robot, robot.q0 + random.uniform(-0.2, 0.2, 6), relative, WEIGHTS)
+        problem, J = towards(robot, robot.q0 + random.uniform(-0.2, 0.2, 6), relative, WEIGHTS)
         e = pin.log6(relative).np
         leak = np.diag(1 / WEIGHTS) @ np.linalg.inv(J).T
         expected = np.linalg.solve(J + added * leak, e)
@@ -113,7 +112,7 @@ def test_one_undamped_task_does_not_need_it() -> None:
     random = np.random.default_rng(4)
     for _ in range(20):
         relative = random_placement(random, random.uniform(0.1, 2.5))
-        problem, J = pose_problem(robot, robot.q0 + random.uniform(-0.2, 0.2, 6), relative, WEIGHTS)
+        problem, J = towards(robot, robot.q0 + random.uniform(-0.2, 0.2, 6), relative, WEIGHTS)
         expected = np.linalg.solve(J, pin.log6(relative).np)
         for log_derivative in (True, False):
             v = qp_velocity(problem, 0.0, log_derivative=log_derivative)
@@ -123,9 +122,7 @@ def test_one_undamped_task_does_not_need_it() -> None:
 def test_damping_brings_the_difference_out() -> None:
     """Under damping the two velocities differ: the equalities above are not empty."""
     robot = load_robot("ur5")
-    problem, _ = pose_problem(
-        robot, robot.q0, random_placement(np.random.default_rng(5), 2.0), WEIGHTS
-    )
+    problem, _ = towards(robot, robot.q0, random_placement(np.random.default_rng(5), 2.0), WEIGHTS)
     with_it = qp_velocity(problem, 0.1, log_derivative=True)
     without = qp_velocity(problem, 0.1, log_derivative=False)
     assert np.abs(with_it - without).max() > 1e-2

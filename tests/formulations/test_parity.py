@@ -9,16 +9,13 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from makers.problems import KeepsProgram, kinematics_at, problem_at, with_limits_in_force
 
 from dikbench import DikAnswer, Robot, load_robot, solve_dik
 from dikbench.arrays import Array
 from dikbench.plugins.building import make_formulation
 from dikbench.problem import DikProblem
 from dikbench.problem.tasks import LinearizedTask, PoseTask, PostureTask
-from dikbench.programs.quadratic_program import QuadraticProgram
-from dikbench.robots.kinematics import Kinematics
-from dikbench.solvers.catalogue.back_ends import parse_solver
-from dikbench.solvers.checked_solve import make_solve
 from formulations.drake_system import scaled_bounds
 
 PEERS = Path(__file__).parents[1] / "data" / "peers"
@@ -45,12 +42,7 @@ def label(record: dict[str, Any]) -> str:
 
 def limited(case: str, in_force: str) -> Robot:
     """The robot of a case with position limits (q), velocity limits (v), both or none in force."""
-    robot = load_robot(CASES[case]["robot"])
-    if "q" not in in_force:
-        robot = robot.with_limits(position=None)
-    if "v" not in in_force:
-        robot = robot.with_limits(velocity=None)
-    return robot
+    return with_limits_in_force(CASES[case]["robot"], in_force)
 
 
 def answer(law: str, robot: Robot, q: object, V: object, posture: Array) -> DikAnswer:
@@ -139,8 +131,7 @@ def test_drakes_system(record: dict[str, Any]) -> None:
 
 
 def _world_task(robot: Robot, q: Array, V: Array) -> tuple[Array, Array]:
-    kinematics = Kinematics(robot)
-    kinematics.update(q)
+    kinematics = kinematics_at(robot, q)
     R = kinematics.placement(robot.frame_id).rotation
     J = kinematics.jacobian(robot.frame_id)
     return np.vstack([R @ J[:3], R @ J[3:]]), V
@@ -149,24 +140,11 @@ def _world_task(robot: Robot, q: Array, V: Array) -> tuple[Array, Array]:
 # --- Pink and mink
 
 
-class _Kept:
-    """A solve that keeps the program it is given."""
-
-    def __init__(self) -> None:
-        self.solve = make_solve(parse_solver("daqp"), "qp")
-        self.program: QuadraticProgram | None = None
-
-    def __call__(self, program: Any) -> Array:
-        self.program = program
-        return self.solve(program)
-
-
 def _peer_problem(record: dict[str, Any], robot: Robot, posture_weight: float) -> DikProblem:
     """Their frame task towards the pose moved by dt V, and their posture task, dead-beat."""
     case = CASES[record["id"]]
     q, V = np.array(case["q"]), np.array(case["V"])
-    kinematics = Kinematics(robot)
-    kinematics.update(q)
+    kinematics = kinematics_at(robot, q)
     X = kinematics.placement(robot.frame_id).copy()
     body = np.concatenate([X.rotation.T @ V[:3], X.rotation.T @ V[3:]])
     target = X * pin.exp6(pin.Motion(DT * body))
@@ -175,7 +153,7 @@ def _peer_problem(record: dict[str, Any], robot: Robot, posture_weight: float) -
         posture = q + 0.3 * np.cos(np.arange(robot.nv))
         task = PostureTask(target=posture, gain=1 / DT, weight=posture_weight)
         tasks.append(task.linearize(kinematics))
-    return DikProblem(robot, q, None, DT, tasks, robot.limits.at(q))
+    return problem_at(robot, q, tasks)
 
 
 def _bounds(G: Array, h: Array, n: int) -> tuple[Array, Array]:
@@ -204,7 +182,7 @@ def test_pinks_program_and_velocity(variant: str) -> None:
     for record in solved:
         robot = load_robot(CASES[record["id"]]["robot"])
         problem = _peer_problem(record, robot, 1e-6 if variant in "CD" else 0.0)
-        kept = _Kept()
+        kept = KeepsProgram()
         v = law.velocity(problem, kept)
         program = kept.program
         assert program is not None
@@ -250,7 +228,7 @@ def test_minks_program_outside_its_defect(limits: str) -> None:
         if record["limits"] != limits or record["id"] == "panda_outside_limit":
             continue
         robot = limited(record["id"], in_force)
-        kept = _Kept()
+        kept = KeepsProgram()
         v = law.velocity(_peer_problem(record, robot, 0.0), kept)
         program = kept.program
         assert program is not None

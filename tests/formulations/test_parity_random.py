@@ -9,21 +9,18 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
+from makers.problems import KeepsProgram, kinematics_at, problem_at
 
 from dikbench import DikAnswer, Robot, Status, load_robot, solve_dik
 from dikbench.arrays import Array
 from dikbench.plugins.building import make_formulation
 from dikbench.problem import DikProblem
 from dikbench.problem.tasks import PoseTask, PostureTask
-from dikbench.programs.quadratic_program import QuadraticProgram
 from dikbench.robots.kinematics import Kinematics
-from dikbench.solvers.catalogue.back_ends import parse_solver
-from dikbench.solvers.checked_solve import make_solve
 from formulations.lu_kernel import lu_kernel
 
 DT = 0.01
@@ -181,27 +178,13 @@ def test_drakes_system(name: str) -> None:
 
 def peer_problem(robot: Robot, q: Array, before: Array, V: Array) -> DikProblem:
     """Their frame task towards the pose moved by dt V, and their posture task, dead-beat."""
-    kinematics = Kinematics(robot)
-    kinematics.update(q)
+    kinematics = kinematics_at(robot, q)
     target = kinematics.placement(robot.frame_id) * pin.exp6(pin.Motion(DT * V))
     tasks = [
         PoseTask(target=target, gain=1 / DT).linearize(kinematics),
         PostureTask(target=nominal(q), gain=1 / DT, weight=1e-4).linearize(kinematics),
     ]
-    return DikProblem(robot, q, before, DT, tasks, robot.limits.at(q))
-
-
-class KeepsProgram:
-    """A solve that keeps the program it is given."""
-
-    def __init__(self) -> None:
-        self.solve = make_solve(parse_solver(EXACT), "qp")
-        self.program: QuadraticProgram | None = None
-
-    def __call__(self, program: Any) -> Array:
-        """See `Solve`."""
-        self.program = program
-        return self.solve(program)
+    return problem_at(robot, q, tasks, before, DT)
 
 
 CONFLICTS = {("panda", "pink-a"): 9, ("xarm7", "pink-a"): 2}
@@ -225,7 +208,7 @@ def test_programs_and_velocities_of_pink_and_mink(name: str, peer: str) -> None:
         *(KEPT[f"{name}/{peer}/{key}"] for key in ("lower", "upper", "v")),
         strict=True,
     ):
-        kept, problem = KeepsProgram(), peer_problem(robot, q, before, V)
+        kept, problem = KeepsProgram(EXACT), peer_problem(robot, q, before, V)
         v = law.velocity(problem, kept)
         program = kept.program
         assert program is not None

@@ -8,15 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from makers.problems import equation, problem_at, solve_for
 
-from dikbench import DikProblem, LinearizedTask, PostureTask, Robot, load_robot
+from dikbench import LinearizedTask, PostureTask, Robot, load_robot
 from dikbench.arrays import Array
 from dikbench.plugins.building import make_formulation
 from dikbench.plugins.finding import plugins
 from dikbench.problem import program_of
 from dikbench.robots.kinematics import Kinematics, smallest_singular_value
-from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, parse_solver
-from dikbench.solvers.checked_solve import make_solve
 
 PANDA = load_robot("panda")
 STATES = 30
@@ -78,10 +77,10 @@ def steps(second: str, *, bounded: bool) -> Iterator[Step]:
         row = row * np.sign(row[0, np.abs(row[0]).argmax()])  # the sign of an SVD is arbitrary
         if second == "independent":
             row = row + J[found % 6] / np.linalg.norm(J[found % 6])
-        other = LinearizedTask(row, speed, np.zeros(1), priority=2)
+        other = equation(row, speed, priority=2)
         if second == "conflicting":
             other = PostureTask(PANDA.q0).linearize(kinematics)
-        yield Step(robot, q, LinearizedTask(J, V, np.zeros(6)), other)
+        yield Step(robot, q, equation(J, V), other)
         found += 1
 
 
@@ -89,14 +88,10 @@ def steps(second: str, *, bounded: bool) -> Iterator[Step]:
 def measured(selector: str, second: str, *, bounded: bool) -> tuple[float, float]:
     """The worst leak into the first task, and the largest change of a joint's velocity [rad/s]."""
     law = make_formulation(selector)
-    program = program_of(law)
-    solve = make_solve(program and parse_solver(DEFAULT_SOLVER[program]), program)
+    solve = solve_for(law)
     leak = change = 0.0
     for robot, q, *tasks in steps(second, bounded=bounded):
-        alone, both = (
-            law.velocity(DikProblem(robot, q, None, 0.01, tasks[:count], robot.limits.at(q)), solve)
-            for count in (1, 2)
-        )
+        alone, both = (law.velocity(problem_at(robot, q, tasks[:count]), solve) for count in (1, 2))
         leak = max(leak, float(np.linalg.norm(tasks[0].J @ (both - alone))))
         change = max(change, float(np.abs(both - alone).max()))
     return leak, change

@@ -11,17 +11,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from makers.problems import equation, kinematics_at, problem_at, task_jacobian, velocity_of
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError, Infeasible, SolverFailed
 from dikbench.linear_algebra import null_space
 from dikbench.plugins.building import make_formulation
-from dikbench.problem import DikProblem, program_of
+from dikbench.problem import DikProblem
 from dikbench.problem.tasks import LinearizedTask, OrientationTask, PositionTask, PostureTask
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.robot import Robot
-from dikbench.solvers.catalogue.back_ends import parse_solver
 from dikbench.solvers.checked_solve import make_solve
 from dikbench.testing.states import SINGULAR
 from formulations.lp_alpha_components import twist_from_rates
@@ -31,23 +31,13 @@ from formulations.manipulability import manipulability_gradient
 DT = 0.01
 
 
-def _velocity(law: str, problem: DikProblem) -> Array:
-    formulation = make_formulation(law)
-    program = program_of(formulation)
-    solve = make_solve(None if program is None else parse_solver("daqp"), program)
-    solve.begin_step(0)
-    return formulation.velocity(problem, solve)
-
-
 def _problem(
     robot: Robot, random: np.random.Generator, speed: float, *, second: str = "posture"
 ) -> DikProblem:
     """A random state near the robot's start with a random twist and a second task."""
     q = pin.integrate(robot.model, robot.q0, random.uniform(-0.4, 0.4, robot.nv))
-    kinematics = Kinematics(robot)
-    kinematics.update(q)
-    J = kinematics.jacobian(robot.frame_id)
-    tasks = [LinearizedTask(J, speed * random.normal(size=6), np.zeros(6))]
+    kinematics = kinematics_at(robot, q)
+    tasks = [equation(kinematics.jacobian(robot.frame_id), speed * random.normal(size=6))]
     if second == "posture":
         target = pin.integrate(robot.model, q, random.uniform(-0.3, 0.3, robot.nv))
         tasks.append(PostureTask(target=target).linearize(kinematics))
@@ -56,7 +46,7 @@ def _problem(
         point = X.translation + random.uniform(-0.2, 0.2, 3)
         elbow = PositionTask(target=point, frame="panda_link4", priority=2)
         tasks.append(elbow.linearize(kinematics))
-    return DikProblem(robot, q, None, DT, tasks, robot.limits.at(q))
+    return problem_at(robot, q, tasks)
 
 
 def _problems(count: int, speed: float, second: str = "posture") -> Iterator[DikProblem]:
@@ -72,7 +62,7 @@ def test_a_hierarchy_of_one_level_is_the_weighted_program() -> None:
     """Bounds active or not."""
     for speed in (0.1, 2.0):
         for problem in _problems(30, speed, "none"):
-            one, qp = (_velocity(law, problem) for law in ("hqp", "qp[braking=viable]"))
+            one, qp = (velocity_of(law, problem) for law in ("hqp", "qp[braking=viable]"))
             assert one == pytest.approx(qp, abs=1e-6)
 
 
@@ -83,8 +73,8 @@ def test_a_hierarchy_inside_the_limits_is_the_null_space_projection(second: str)
     random = np.random.default_rng(1)
     for _ in range(30):
         problem = _problem(free, random, 0.1, second=second)
-        hierarchy = _velocity("hqp[damping=0]", problem)
-        projection = _velocity("nullspace", problem)
+        hierarchy = velocity_of("hqp[damping=0]", problem)
+        projection = velocity_of("nullspace", problem)
         for level in problem.levels:
             assert level.J @ hierarchy == pytest.approx(level.J @ projection, abs=1e-7)
         if second == "posture":
@@ -96,10 +86,10 @@ def test_a_hierarchy_inside_the_limits_is_the_null_space_projection(second: str)
 def test_the_second_level_does_not_leak_into_the_first(second: str, speed: float) -> None:
     """What level 1 reaches alone it keeps, bounds active or not, to rounding."""
     for problem in _problems(40, speed, second):
-        alone = DikProblem(problem.robot, problem.q, None, DT, problem.tasks[:1], problem.limits)
+        alone = problem_at(problem.robot, problem.q, problem.tasks[:1])
         J = problem.tasks[0].J
-        first = _velocity("hqp[damping=1e-5]", alone)  # as the levels above the last have
-        both = _velocity("hqp", problem)
+        first = velocity_of("hqp[damping=1e-5]", alone)  # as the levels above the last have
+        both = velocity_of("hqp", problem)
         assert J @ both == pytest.approx(J @ first, abs=1e-7)
 
 
@@ -108,8 +98,8 @@ def test_the_weighted_program_tends_to_the_hierarchy() -> None:
     for problem in _problems(20, 1.0):
         first, second = problem.tasks
         heavy = LinearizedTask(first.J, first.V, first.error, 1e6)
-        weighted = DikProblem(problem.robot, problem.q, None, DT, [heavy, second], problem.limits)
-        hierarchy, qp = _velocity("hqp", problem), _velocity("qp", weighted)
+        weighted = problem_at(problem.robot, problem.q, [heavy, second])
+        hierarchy, qp = velocity_of("hqp", problem), velocity_of("qp", weighted)
         assert first.J @ hierarchy == pytest.approx(first.J @ qp, abs=1e-3)
         assert hierarchy == pytest.approx(qp, abs=2e-2)
 
@@ -127,7 +117,7 @@ def test_three_levels_are_answered_where_bounds_bind() -> None:
         posture.priority = 3
         problem = msgspec.structs.replace(drawn, tasks=[posture, orientation, position])
         try:
-            v = _velocity("hqp", problem)
+            v = velocity_of("hqp", problem)
         except SolverFailed:
             continue
         answered += 1
@@ -139,15 +129,15 @@ def test_three_levels_are_answered_where_bounds_bind() -> None:
 def test_least_squares_in_velocity_limits_is_damped_least_squares_where_none_binds() -> None:
     """And elsewhere stays inside them, where clipping would too, with less error."""
     for problem in _problems(30, 0.05, "none"):
-        qp, dls = (_velocity(law, problem) for law in ("qp-velocity", "dls[damping=1e-3]"))
+        qp, dls = (velocity_of(law, problem) for law in ("qp-velocity", "dls[damping=1e-3]"))
         assert qp == pytest.approx(dls, abs=1e-7)
     for problem in _problems(30, 3.0, "none"):
         task, limit = problem.primary, problem.limits.joint.velocity
         assert limit is not None
-        qp = _velocity("qp-velocity", problem)
+        qp = velocity_of("qp-velocity", problem)
         assert np.all(qp <= limit.upper + 1e-7)
         assert np.all(qp >= limit.lower - 1e-7)
-        clip = _velocity("pinv[after=clip]", problem)
+        clip = velocity_of("pinv[after=clip]", problem)
         error, clipped = (float(np.linalg.norm(task.J @ v - task.V)) for v in (qp, clip))
         assert error <= clipped + 1e-4
 
@@ -164,9 +154,9 @@ def test_two_stages_go_as_far_as_one_and_nearer_to_the_posture() -> None:
     """The same alpha as the linear program; the null space serves the posture, Drake's leaks."""
     leaks = 0
     for problem in _problems(60, 1.0):
-        one = _velocity("lp-alpha[regularization=0]", problem)
-        two = _velocity("alpha-two-stage", problem)
-        drake = _velocity("drake[centering=10]", problem)
+        one = velocity_of("lp-alpha[regularization=0]", problem)
+        two = velocity_of("alpha-two-stage", problem)
+        drake = velocity_of("drake[centering=10]", problem)
         posture = problem.tasks[1]
         assert _alpha(problem, two) == pytest.approx(_alpha(problem, one), abs=1e-7)
         assert _alpha(problem, drake) <= _alpha(problem, two) + 1e-7
@@ -179,7 +169,7 @@ def test_two_stages_go_as_far_as_one_and_nearer_to_the_posture() -> None:
 def test_components_are_the_whole_where_all_is_feasible() -> None:
     """Alpha = 1 in each: J v = V."""
     for problem in _problems(20, 0.02, "none"):
-        v = _velocity("lp-alpha-components", problem)
+        v = velocity_of("lp-alpha-components", problem)
         assert problem.primary.J @ v == pytest.approx(problem.primary.V, abs=1e-5)
 
 
@@ -191,9 +181,9 @@ def test_components_keep_axes_that_the_whole_would_slow_down() -> None:
         kinematics = Kinematics(robot)
         kinematics.update(problem.q)
         E = twist_from_rates(kinematics.placement(robot.frame_id).rotation)
-        v = _velocity("lp-alpha-components[regularization=0]", problem)
+        v = velocity_of("lp-alpha-components[regularization=0]", problem)
         alphas = np.linalg.solve(E, task.J @ v) / np.linalg.solve(E, task.V)
-        common = _alpha(problem, _velocity("lp-alpha[regularization=0]", problem))
+        common = _alpha(problem, velocity_of("lp-alpha[regularization=0]", problem))
         assert np.all(alphas >= -1e-6)
         assert np.all(alphas <= 1 + 1e-6)
         assert alphas.sum() >= 6 * common - 1e-6
@@ -212,10 +202,10 @@ def test_components_of_an_orientation_are_roll_pitch_and_yaw() -> None:
         target = R @ pin.exp3(random.uniform(-1, 1, 3))
         task = OrientationTask(target=target, gain=20.0).linearize(kinematics)
         problem = msgspec.structs.replace(drawn, tasks=[task])
-        v = _velocity("lp-alpha-components[regularization=0]", problem)
+        v = velocity_of("lp-alpha-components[regularization=0]", problem)
         E = twist_from_rates(R)[3:, 3:]
         alphas = np.linalg.solve(E, task.J @ v) / np.linalg.solve(E, task.V)
-        common = _alpha(problem, _velocity("lp-alpha[regularization=0]", problem))
+        common = _alpha(problem, velocity_of("lp-alpha[regularization=0]", problem))
         assert np.all((alphas >= -1e-6) & (alphas <= 1 + 1e-6))
         assert alphas.sum() >= 3 * common - 1e-6
         held_back += alphas.min() < 0.99
@@ -239,8 +229,8 @@ def test_components_of_a_position_need_no_rates_of_roll_and_yaw() -> None:
         twist_from_rates(R)
     point = kinematics.placement(robot.frame_id).translation + np.array([0.01, -0.02, 0.01])
     task = PositionTask(target=point).linearize(kinematics)
-    problem = DikProblem(robot, q, None, DT, [task], robot.limits.at(q))
-    v = _velocity("lp-alpha-components", problem)
+    problem = problem_at(robot, q, [task])
+    v = velocity_of("lp-alpha-components", problem)
     assert task.J @ v == pytest.approx(task.V, abs=1e-6)
 
 
@@ -282,16 +272,14 @@ def test_a_joint_without_acceleration_limit_at_its_position_limit_has_no_brake(l
     )
     q = robot.q0.copy()
     q[0] = highest[0]
-    kinematics = Kinematics(robot)
-    kinematics.update(q)
-    J = kinematics.jacobian(robot.frame_id)
+    J = task_jacobian(robot, q)
     wanted = np.array([-0.1, 0.1, 0.1, -0.1, 0.1, -0.1, 0.1])
-    tasks = [LinearizedTask(J, J @ wanted, np.zeros(6))]
+    tasks = [equation(J, J @ wanted)]
     damped = make_formulation("dls[damping=0.01]")
-    problem = DikProblem(robot, q, None, DT, tasks, robot.limits.at(q))
+    problem = problem_at(robot, q, tasks)
     expected = damped.velocity(problem, make_solve(None, None))
     assert expected[0] < 0
-    assert _velocity(f"{law}[damping=0.01]", problem) == pytest.approx(expected, abs=1e-8)
+    assert velocity_of(f"{law}[damping=0.01]", problem) == pytest.approx(expected, abs=1e-8)
 
 
 # --- NEO
@@ -306,8 +294,8 @@ def test_neo_without_its_reward_is_damped_least_squares() -> None:
         task = problem.tasks[0]
         task.error = random.uniform(-0.05, 0.05, 6)
         e = float(np.abs(task.error).sum())
-        damped = _velocity(f"dls[damping={float(np.sqrt(0.01 * e))!r}]", problem)
-        assert _velocity("neo[manipulability_gain=0]", problem) == pytest.approx(damped, abs=1e-6)
+        damped = velocity_of(f"dls[damping={float(np.sqrt(0.01 * e))!r}]", problem)
+        assert velocity_of("neo[manipulability_gain=0]", problem) == pytest.approx(damped, abs=1e-6)
 
 
 def test_neos_reward_raises_the_manipulability() -> None:
@@ -318,7 +306,7 @@ def test_neos_reward_raises_the_manipulability() -> None:
         J = problem.tasks[0].J
         gradient = manipulability_gradient(J)
         with_it, without = (
-            _velocity(f"neo[manipulability_gain={gain}]", problem) for gain in (1, 0)
+            velocity_of(f"neo[manipulability_gain={gain}]", problem) for gain in (1, 0)
         )
         better += float(gradient @ with_it) > float(gradient @ without)
     assert better == 30

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, find, given, settings
 from hypothesis import strategies as st
+from makers.problems import equation, kinematics_at, problem_at
 
-from dikbench import LinearizedTask, PostureTask, load_robot
+from dikbench import PostureTask, load_robot
 from dikbench.arrays import Array
 from dikbench.plugins.building import make_formulation
 from dikbench.plugins.finding import plugins
 from dikbench.problem import DikProblem, Formulation, LimitKind, Solve, program_of
 from dikbench.problem.velocity_box import velocity_box
-from dikbench.robots.kinematics import Kinematics
 from dikbench.testing import check_state
 from dikbench.testing.states import SINGULAR, State
 
@@ -92,16 +92,15 @@ def states(draw: st.DrawFn) -> State:
         )
         v_prev = (1.5 if before == "too fast" else 1.0) * fastest * np.array(draw(_vector(n, side)))
     dt = draw(st.sampled_from([0.01, 1e-3, 0.1]))
-    kinematics = Kinematics(robot)
-    kinematics.update(q)
+    kinematics = kinematics_at(robot, q)
     J = kinematics.jacobian(robot.frame_id)[list(robot.task_rows)]
-    tasks = [LinearizedTask(J, V, np.zeros(rows))]
+    tasks = [equation(J, V)]
     posture = draw(st.booleans())
     if posture:
         tasks.append(PostureTask(robot.q0, gain=1 / dt).linearize(kinematics))
     label = f"{name}, {place}, limits {kinds}, |V| <= {size:g}, before {before}, dt {dt}"
     label += f", posture {posture}, q {q.tolist()}, v_prev {v_prev}, V {V.tolist()}"
-    problem = DikProblem(robot, q, v_prev, dt, tasks, robot.limits.at(q))
+    problem = problem_at(robot, q, tasks, v_prev, dt)
     if draw(st.booleans()):
         problem.G, problem.h = draw(_half_spaces(problem))
         label += f", G {problem.G.tolist()}, h {problem.h.tolist()}"

@@ -14,14 +14,14 @@ from dikbench.simulation.control_step import control_step
 from dikbench.simulation.status import Status
 from dikbench.solvers.catalogue.back_ends import (
     BACK_ENDS,
-    PRESETS,
     Solver,
     is_installed,
     parse_solver,
     why_not,
 )
+from dikbench.solvers.catalogue.presets import TOLERANCES
 from dikbench.solvers.checked_solve import make_solve
-from dikbench.testing import CHECKS, ROUNDING, assert_within
+from dikbench.testing import CHECKS, LIMIT_TOLERANCE_RAD_S, assert_within
 from dikbench.testing.states import State, states
 
 # What a solver grumbles about is in its answer's status.
@@ -80,7 +80,7 @@ def kept_promises(formulation: Formulation, solver: Solver, stride: int) -> int:
         if outcome.status is not Status.OK or verdicts.lied[0]:
             continue
         answered += 1
-        tolerance = ROUNDING + solve.calls * float(verdicts.primal[0])
+        tolerance = LIMIT_TOLERANCE_RAD_S + solve.calls * float(verdicts.primal[0])
         for kind in promises_of(formulation):
             assert_within(state, kind, outcome.velocity, tolerance)
     return answered
@@ -94,7 +94,7 @@ def test_promises_are_kept_with_every_solver(law: str, solver: str) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("preset", [preset for preset in PRESETS if preset != "default"])
+@pytest.mark.parametrize("preset", [preset for preset in TOLERANCES if preset != "default"])
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("law", LAWS)
 def test_promises_are_kept_with_every_preset(law: str, solver: str, preset: str) -> None:

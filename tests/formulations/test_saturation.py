@@ -7,16 +7,23 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
+from makers.problems import (
+    equation,
+    equations,
+    planar_robot,
+    problem_at,
+    problem_of,
+    solve_for,
+    task_jacobian,
+)
 
-from dikbench import LinearizedTask, Robot, load_robot
+from dikbench import Robot, load_robot
 from dikbench.arrays import Array
 from dikbench.errors import Infeasible
 from dikbench.plugins.building import make_formulation
-from dikbench.problem import DikProblem, program_of
+from dikbench.problem import DikProblem
 from dikbench.programs.quadratic_program import QuadraticProgram
-from dikbench.robots.kinematics import Kinematics, smallest_singular_value
-from dikbench.robots.planar_arm import planar_arm
-from dikbench.robots.robot import model_limits
+from dikbench.robots.kinematics import smallest_singular_value
 from dikbench.simulation.control_step import control_step
 from dikbench.simulation.status import Status
 from dikbench.solvers.catalogue.back_ends import parse_solver
@@ -32,27 +39,19 @@ SAME = 1e-6
 @functools.cache
 def arm(n: int) -> Robot:
     """An arm of n joints without limits."""
-    model = planar_arm((0.2,) * n, velocity_limits=(1.0,) * n)
-    robot = Robot(f"planar{n}r", model, "tip", model_limits(model), np.zeros(n), (0, 1))
-    return robot.with_limits(position=None, velocity=None)
+    return planar_robot(*(0.2,) * n, velocity=1.0).with_limits(position=None, velocity=None)
 
 
-def problem_of(lower: Array, upper: Array, *levels: tuple[Array, Array]) -> DikProblem:
+def limited(lower: Array, upper: Array, *levels: tuple[Array, Array]) -> DikProblem:
     """A control step with velocity limits and tasks J v = V in numbers, one per priority."""
     robot = arm(len(lower)).with_limits(velocity=(lower, upper))
-    tasks = [
-        LinearizedTask(J, V, np.zeros(len(V)), 1.0, priority)
-        for priority, (J, V) in enumerate(levels, start=1)
-    ]
-    return DikProblem(robot, robot.q0, None, 0.01, tasks, robot.limits.at(robot.q0))
+    return problem_of(*equations(*levels), robot=robot)
 
 
 def ask(law: str, problem: DikProblem) -> Array | None:
     """What a law answers, by daqp where it needs a solver; None where it has no answer."""
     formulation = make_formulation(law)
-    program = program_of(formulation)
-    solve = make_solve(None if program is None else parse_solver("daqp"), program)
-    outcome = control_step(formulation, problem, solve)
+    outcome = control_step(formulation, problem, solve_for(formulation))
     return outcome.velocity if outcome.status is Status.OK else None
 
 
@@ -87,16 +86,14 @@ def arm_states(name: str, count: int, wish: Callable[[Array, Array], Array]) -> 
     assert position is not None
     assert limit is not None
     robot = known.with_limits(position=None)
-    random, kinematics, found = np.random.default_rng(0), Kinematics(robot), []
+    random, found = np.random.default_rng(0), list[DikProblem]()
     lower, upper = np.maximum(position.lower, -np.pi), np.minimum(position.upper, np.pi)
     while len(found) < count:
         q = random.uniform(lower, upper)
-        kinematics.update(q)
-        J = kinematics.jacobian(robot.frame_id).copy()
+        J = task_jacobian(robot, q)
         V = wish(J @ random.uniform(limit.lower, limit.upper), random.normal(size=6))
         if smallest_singular_value(J) > 0.02:
-            task = LinearizedTask(J, V, np.zeros(6))
-            found.append(DikProblem(robot, q, None, 0.01, [task], robot.limits.at(q)))
+            found.append(problem_at(robot, q, [equation(J, V)]))
     return found
 
 
@@ -162,7 +159,7 @@ def rethink_states(
         bound = np.where(random.random(n) < 0.5, lower, upper)
         v = np.where(random.random(n) < 0.5, bound, v)  # half the joints are at a bound
         s = float(random.uniform(0.1, 1))
-        yield problem_of(lower, upper, (J, J @ v / s)), s
+        yield limited(lower, upper, (J, J @ v / s)), s
 
 
 @pytest.mark.parametrize("count", COUNTS)
@@ -213,7 +210,7 @@ def test_saturation_by_hand(law: str) -> None:
         (8.0, [1, 3]),
         (-4, [-1, -1]),
     ):
-        problem = problem_of(lower, upper, (J, np.array([float(wanted)])))
+        problem = limited(lower, upper, (J, np.array([float(wanted)])))
         np.testing.assert_allclose(answer(law, problem), v, atol=1e-12)
 
 
@@ -221,11 +218,11 @@ def test_saturation_by_hand(law: str) -> None:
 def test_joint_that_the_task_does_not_move(law: str) -> None:
     """A joint beside the task sets no scale; where its box excludes rest it is held in it."""
     J = np.array([[1.0, 1.0, 0.0]])
-    for wanted, v in ((3.0, [1, 2, 0]), (8.0, [1, 3, 0])):
-        problem = problem_of(-np.ones(3), np.array([1.0, 3.0, 1.0]), (J, np.array([wanted])))
+    for wanted, v in ((3.0, [1.0, 2, 0]), (8.0, [1.0, 3, 0])):
+        problem = limited(-np.ones(3), np.array([1.0, 3.0, 1.0]), (J, np.array([wanted])))
         np.testing.assert_allclose(answer(law, problem), v, atol=1e-12)
     lower, upper = np.array([-1.0, -1.0, 0.2]), np.array([1.0, 3.0, 0.8])
-    for wanted, v in ((0.0, [0, 0, 0.2]), (3.0, [1, 2, 0.2]), (8.0, [1, 3, 0.2])):
+    for wanted, v in ((0.0, [0.0, 0, 0.2]), (3.0, [1, 2, 0.2]), (8.0, [1, 3, 0.2])):
         problem = problem_of_box(lower, upper, J, np.array([wanted]))
         np.testing.assert_allclose(answer(law, problem), v, atol=1e-12)
 
@@ -240,7 +237,7 @@ def test_optimal_saturation_is_the_least_motion_where_the_task_is_done() -> None
     for _ in range(400):
         J, upper = random.normal(size=(3, 7)), random.uniform(0.2, 2, 7)
         v = np.where(random.random(7) < 0.7, upper, random.uniform(-upper, upper))
-        problem = problem_of(-upper, upper, (J, 0.98 * J @ v))
+        problem = limited(-upper, upper, (J, 0.98 * J @ v))
         if scale("pinv[after=scale]", problem) > 1 - 1e-9:
             continue
         for law in SNS:
@@ -284,8 +281,8 @@ def test_lower_levels_are_scaled_too(law: str) -> None:
     for _ in range(200):
         upper = random.uniform(0.2, 2, 7)
         first, second = [(random.normal(size=(2, 7)), 2 * random.normal(size=2)) for _ in range(2)]
-        problem = problem_of(-upper, upper, first, second)
-        v, alone = answer(law, problem), answer(law, problem_of(-upper, upper, first))
+        problem = limited(-upper, upper, first, second)
+        v, alone = answer(law, problem), answer(law, limited(-upper, upper, first))
         assert np.all(np.abs(v) <= upper)
         np.testing.assert_allclose(first[0] @ (v - alone), np.zeros(2), atol=1e-9)
         J, V = second
@@ -320,7 +317,7 @@ def test_letting_go_at_a_lower_level_never_passes_the_linear_program() -> None:
     for _ in range(1500):
         upper = random.uniform(0.2, 2, 7)
         first, second = [(random.normal(size=(2, 7)), 2 * random.normal(size=2)) for _ in range(2)]
-        alone, both = problem_of(-upper, upper, first), problem_of(-upper, upper, first, second)
+        alone, both = limited(-upper, upper, first), limited(-upper, upper, first, second)
         one, two = ([answer(law, problem) for law in SNS] for problem in (alone, both))
         if np.abs(one[0] - one[1]).max() > 1e-9 or np.abs(two[0] - two[1]).max() < 1e-6:
             continue
@@ -353,21 +350,17 @@ def test_answers_in_saturated_motion_under_acceleration_limits(factor: float) ->
     position, limit = robot.limits.position, robot.limits.velocity
     assert position is not None
     assert limit is not None
-    random, kinematics = np.random.default_rng(0), Kinematics(robot)
+    random = np.random.default_rng(0)
     feasible, gaps = 0, []
     for _ in range(300):
         q = random.uniform(position.lower, position.upper)
-        kinematics.update(q)
-        J = kinematics.jacobian(robot.frame_id).copy()
+        J = task_jacobian(robot, q)
         V = factor * J @ random.uniform(limit.lower, limit.upper)
-        task = LinearizedTask(J, V, np.zeros(6))
-        before = ask("sns", DikProblem(free, q, None, 0.01, [task], free.limits.at(q)))
+        before = ask("sns", problem_at(free, q, [equation(J, V)]))
         if before is None:
             continue
         q = q + 0.01 * before
-        kinematics.update(q)
-        task = LinearizedTask(kinematics.jacobian(robot.frame_id).copy(), V, np.zeros(6))
-        problem = DikProblem(robot, q, before, 0.01, [task], robot.limits.at(q))
+        problem = problem_at(robot, q, [equation(task_jacobian(robot, q), V)], before)
         if ask(LP, problem) is None:
             continue
         feasible += 1
@@ -389,7 +382,7 @@ def test_level_that_does_not_fit_is_left_out(law: str) -> None:
     # It needs joint 2 to make up for joint 1 even at s = 0, beyond its limit.
     second = (np.array([[2.0, 1.0, 0.0]]), np.array([1e-3]))
     third = (np.array([[0.0, 0.0, 1.0]]), np.array([0.5]))
-    v = answer(law, problem_of(-upper, upper, first, second, third))
+    v = answer(law, limited(-upper, upper, first, second, third))
     np.testing.assert_allclose(v, [1.0, 0.0, 0.5], atol=1e-12)
 
 
@@ -399,13 +392,10 @@ def test_at_a_singularity_it_is_the_scaled_pseudo_inverse(law: str, name: str) -
     """Where J has lost a rank for good, what can be done is done and scaled, without a blow-up."""
     robot = load_robot(name).with_limits(position=None)
     q = np.zeros(robot.nv)  # fully stretched: singular on both
-    kinematics = Kinematics(robot)
-    kinematics.update(q)
-    J = kinematics.jacobian(robot.frame_id).copy()
+    J = task_jacobian(robot, q)
     assert smallest_singular_value(J) < 1e-9
     for twist in np.random.default_rng(3).normal(size=(20, 6)):
-        task = LinearizedTask(J, 3 * twist, np.zeros(6))
-        problem = DikProblem(robot, q, None, 0.01, [task], robot.limits.at(q))
+        problem = problem_at(robot, q, [equation(J, 3 * twist)])
         plain, v = answer("pinv[after=scale]", problem), answer(law, problem)
         done = J @ plain
         share = float(done @ (J @ v) / (done @ done))
@@ -422,10 +412,7 @@ def outside(name: str, joint: int) -> DikProblem:
     assert robot.limits.position is not None
     q = robot.q0.copy()
     q[joint] = robot.limits.position.upper[joint] + 0.05
-    kinematics = Kinematics(robot)
-    kinematics.update(q)
-    task = LinearizedTask(kinematics.jacobian(robot.frame_id).copy(), np.zeros(6), np.zeros(6))
-    return DikProblem(robot, q, None, 0.01, [task], robot.limits.at(q))
+    return problem_at(robot, q, [equation(task_jacobian(robot, q), np.zeros(6))])
 
 
 @pytest.mark.parametrize("law", SNS)
@@ -468,8 +455,7 @@ def problem_of_box(lower: Array, upper: Array, J: Array, V: Array) -> DikProblem
     """A control step whose box is given: acceleration limits about a motion before."""
     dt = 0.01
     robot = arm(len(lower)).with_limits(acceleration=(upper - lower) / (2 * dt))
-    task = LinearizedTask(J, V, np.zeros(len(V)))
-    return DikProblem(robot, robot.q0, (lower + upper) / 2, dt, [task], robot.limits.at(robot.q0))
+    return problem_at(robot, robot.q0, [equation(J, V)], (lower + upper) / 2, dt)
 
 
 @pytest.mark.parametrize("law", SNS)
@@ -482,10 +468,10 @@ def test_joint_with_hardly_any_freedom_left_is_not_saturated(law: str) -> None:
     first = (np.array([[0, 2, -1, 0], [1, -2e-7, -4e-7, 0]]), np.array([0, 0.1]))
     second = (np.ones((1, 4)), np.array([90.0]))
     upper = np.full(4, 99.0)
-    alone = answer(law, problem_of(-upper, upper, first))
+    alone = answer(law, limited(-upper, upper, first))
     assert alone[0] == pytest.approx(0.1)
     upper[0] = alone[0] + 1e-5
-    both = answer(law, problem_of(-upper, upper, first, second))
+    both = answer(law, limited(-upper, upper, first, second))
     np.testing.assert_allclose(first[0] @ (both - alone), np.zeros(2), atol=1e-12)
     assert both[0] == pytest.approx(upper[0], abs=1e-9)
     assert second[0] @ both > second[0] @ alone + 1

@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from makers.problems import equation, problem_of, velocity_of
 
-from dikbench import DikProblem, LinearizedTask, load_robot
 from dikbench.arrays import Array
-from dikbench.plugins.building import make_formulation
-from dikbench.solvers.checked_solve import make_solve
 
 STRETCHED = np.array([[0.0, 0.0], [2.0, 1.0]])
 """Position Jacobian of two links of 1 m along x."""
@@ -25,12 +23,9 @@ PHI = (1 + sqrt(5)) / 2
 
 def answer(law: str, *tasks: tuple[Array, Array]) -> Array:
     """What a law gives for several tasks (J, V) of first priority, and one of the second."""
-    robot = load_robot("planar3r")
-    linear = [LinearizedTask(J, V, np.zeros(len(V))) for J, V in tasks]
-    n = linear[0].J.shape[1]
-    linear.append(LinearizedTask(np.eye(n), np.ones(n), np.zeros(n), priority=2))
-    problem = DikProblem(robot, robot.q0, None, 0.01, linear, robot.limits.at(robot.q0))
-    return make_formulation(law).velocity(problem, make_solve(None, None))
+    n = tasks[0][0].shape[1]
+    first = [equation(J, V) for J, V in tasks]
+    return velocity_of(law, problem_of(*first, equation(np.eye(n), np.ones(n), priority=2)))
 
 
 def test_stretched_arm_by_hand() -> None:

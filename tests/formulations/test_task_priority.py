@@ -8,27 +8,19 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from makers.problems import equation, equations, problem_of, velocity_of
 
-from dikbench import DikProblem, LinearizedTask, PostureTask, Robot, load_robot
+from dikbench import PostureTask, Robot, load_robot
 from dikbench.arrays import Array
-from dikbench.plugins.building import make_formulation
 from dikbench.robots.kinematics import Kinematics, smallest_singular_value
-from dikbench.solvers.checked_solve import make_solve
 
 PRIORITIES = ("nullspace", "nullspace-robust", "nullspace-unprojected")
 PANDA = load_robot("panda")
 
 
-def level(J: Array, V: Array, priority: int) -> LinearizedTask:
-    """A task in numbers."""
-    return LinearizedTask(J, V, np.zeros(len(V)), 1.0, priority)
-
-
 def answer(law: str, *tasks: tuple[Array, Array], robot: Robot = PANDA) -> Array:
     """What a law gives for J_1 v = V_1 above J_2 v = V_2 above ...; it looks at nothing else."""
-    levels = [level(J, V, number) for number, (J, V) in enumerate(tasks, start=1)]
-    problem = DikProblem(robot, robot.q0, None, 0.01, levels, robot.limits.at(robot.q0))
-    return make_formulation(law).velocity(problem, make_solve(None, None))
+    return velocity_of(law, problem_of(*equations(*tasks), robot=robot))
 
 
 def steps(count: int = 30) -> Iterator[tuple[Kinematics, Array, Array, np.random.Generator]]:
@@ -219,9 +211,7 @@ def test_lowest_unprojected_task_is_done_whatever_it_costs_the_first() -> None:
 @pytest.mark.parametrize("name", ["nullspace", "nullspace-robust"])
 def test_tasks_of_one_priority_are_one_task(name: str) -> None:
     """Hand position and orientation at one priority are the pose task."""
-    law = make_formulation(name)
     for _, J, V, _ in steps(5):
-        tasks = [level(J[:3], V[:3], 1), level(J[3:], V[3:], 1)]
-        problem = DikProblem(PANDA, PANDA.q0, None, 0.01, tasks, PANDA.limits.at(PANDA.q0))
-        v = law.velocity(problem, make_solve(None, None))
+        tasks = equation(J[:3], V[:3]), equation(J[3:], V[3:])
+        v = velocity_of(name, problem_of(*tasks, robot=PANDA))
         np.testing.assert_allclose(v, answer("pinv", (J, V)), atol=1e-10)

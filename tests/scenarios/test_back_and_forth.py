@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from types import MappingProxyType
 
 import numpy as np
 import pinocchio as pin
 import pytest
+from makers.scenarios import metrics_of, put_robot
 from scipy.spatial.transform import Rotation
 
 from dikbench.errors import DikbenchError
@@ -16,8 +16,6 @@ from dikbench.plugins.building import make_scenario
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
 from scenarios.back_and_forth import SET_UPS
-
-Metrics = Callable[..., dict[str, float]]
 
 # Frame, scale and roll about x, as published.
 PUBLISHED = {
@@ -88,10 +86,12 @@ def test_a_seed_turns_it_about_the_vertical_and_changes_its_pace() -> None:
             assert b.translation == pytest.approx(pin.exp3(turned) @ a.translation)
 
 
-def test_feed_forward_follows_to_the_discretization(metrics: Metrics) -> None:
+def test_feed_forward_follows_to_the_discretization() -> None:
     """Nothing is in the way: the error is what a step of dt leaves, and halves with dt."""
     coarse, fine = (
-        metrics("qp", make_scenario(f"back-and-forth[robot=ur10,dt={dt}]"))["position_error_rms_m"]
+        metrics_of("qp", make_scenario(f"back-and-forth[robot=ur10,dt={dt}]"))[
+            "position_error_rms_m"
+        ]
         for dt in (0.02, 0.01)
     )
     assert coarse < 3e-3
@@ -100,12 +100,11 @@ def test_feed_forward_follows_to_the_discretization(metrics: Metrics) -> None:
 
 def test_a_slow_sweep_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """With joints that are three times as fast it asks for too little of them."""
-    module = sys.modules["dikbench.scenario.family"]
     arm = load_robot("ur5", "ee_link")
     velocity = arm.limits.velocity
     assert velocity is not None
     fast = arm.with_limits(velocity=3 * velocity.upper)
-    monkeypatch.setattr(module, "load_robot", lambda name, frame: fast)
+    put_robot(monkeypatch, fast)
     with pytest.raises(DikbenchError, match="required speed over limit"):
         make_scenario("back-and-forth")
 
@@ -114,7 +113,7 @@ def test_a_slow_sweep_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_tenth_of_the_size_is_refused(robot: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A path that is no sweep any more: only the rotation is left of it."""
     module = sys.modules["scenarios.back_and_forth"]
-    monkeypatch.setattr(module, "STOP", module.START + 0.1 * (module.STOP - module.START))
+    monkeypatch.setattr(module, "STOP_M", module.START_M + 0.1 * (module.STOP_M - module.START_M))
     with pytest.raises(DikbenchError, match="sweep from end to end"):
         make_scenario(f"back-and-forth[robot={robot}]")
 

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import importlib.metadata
-import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 import pytest
+from makers.problems import with_upper_limit
+from makers.scenarios import metrics_of, put_robot, scenario_error
 
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_scenario
-from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
-
-Metrics = Callable[..., dict[str, float]]
 
 TRIANGLE = Path(__file__).parents[1] / "data" / "triangle.csv"
 HEADER = "t,x,y,z,qx,qy,qz,qw"
@@ -82,11 +79,11 @@ def test_a_seed_changes_the_pace_only() -> None:
             assert a.homogeneous == pytest.approx(b.homogeneous)
 
 
-def test_laws_follow_the_example(metrics: Metrics) -> None:
+def test_laws_follow_the_example() -> None:
     """It is well inside the arm's reach and speed."""
     scenario = make_scenario(f"csv[file={TRIANGLE}]")
     for law in ("pinv", "qp", "lp-alpha"):
-        assert metrics(law, scenario)["position_error_max_m"] < 1e-3
+        assert metrics_of(law, scenario)["position_error_max_m"] < 1e-3
 
 
 @pytest.mark.parametrize(
@@ -115,14 +112,7 @@ def test_a_pose_that_cannot_be_had_is_named_by_its_line(
 
 def test_a_start_outside_the_limits_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the robot could take the first pose only beyond one of its limits."""
-    module = sys.modules["dikbench.scenario.family"]
-    arm = load_robot("panda")
-    position = arm.limits.position
-    assert position is not None
-    upper = position.upper.copy()
-    upper[3] = -2.5
-    narrow = arm.with_limits(position=(position.lower, upper))
-    monkeypatch.setattr(module, "load_robot", lambda name, frame: narrow)
+    put_robot(monkeypatch, with_upper_limit("panda", 3, -2.5))
     with pytest.raises(DikbenchError, match="position margin at the start"):
         make_scenario(f"csv[file={TRIANGLE}]")
 
@@ -139,7 +129,4 @@ def test_a_start_outside_the_limits_is_refused(monkeypatch: pytest.MonkeyPatch) 
 )
 def test_errors_say_what_is_valid(selector: str, words: str) -> None:
     """One line each."""
-    with pytest.raises(DikbenchError) as caught:
-        make_scenario(selector)
-    assert words in str(caught.value)
-    assert "\n" not in str(caught.value)
+    assert words in scenario_error(selector)

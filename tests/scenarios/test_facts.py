@@ -6,17 +6,12 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from makers.scenarios import run_of
 
 from dikbench.arrays import Array
 from dikbench.metrics import Motion, motion_of
-from dikbench.plugins.building import make_formulation, make_scenario
-from dikbench.problem import program_of
+from dikbench.plugins.building import make_scenario
 from dikbench.problem.progress import off_course, progress
-from dikbench.scenario.plant import Ideal
-from dikbench.simulation.closed_loop import simulate
-from dikbench.simulation.status import Status
-from dikbench.solvers.catalogue.back_ends import parse_solver
-from dikbench.solvers.checked_solve import make_solve
 
 WRIST = "near-miss[robot=ur5,singularity=wrist,miss={}]"
 ELBOW = "near-miss[robot=panda,singularity=elbow,miss={}]"
@@ -28,12 +23,8 @@ TOLERANCE = 0.05
 @lru_cache
 def _motion(law: str, scenario: str) -> Motion:
     """A law's run over a scenario: time-indexed, ideal plant."""
-    formulation, case = make_formulation(law), make_scenario(scenario)
-    program = program_of(formulation)
-    solve = make_solve(None if program is None else parse_solver("daqp"), program)
-    run = simulate(case, formulation, solve, Ideal())
-    assert run.status is Status.OK
-    return motion_of(run.trace, case)
+    case = make_scenario(scenario)
+    return motion_of(run_of(law, case).trace, case)
 
 
 def _peak(motion: Motion) -> float:

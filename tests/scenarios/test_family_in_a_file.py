@@ -12,7 +12,8 @@ import pytest
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_scenario
 from dikbench.plugins.built_scenarios import built
-from dikbench.study.study import Selection, expand, load_study, select
+from dikbench.study.plan import expand
+from dikbench.study.study import Selection, load_study, select
 
 README = Path(__file__).parents[2] / "README.md"
 
@@ -63,7 +64,7 @@ def test_its_ranges_and_its_certificate_are_asserted(line: str) -> None:
     assert str(caught.value) == "scenario StraightLine: speed=3.0 must be 0.01 to 2 [m/s]"
     with pytest.raises(DikbenchError) as caught:
         make_scenario(f"{line}[speed=2]")
-    assert str(caught.value).startswith(f"scenario {line}[speed=2]: certificate failed: ")
+    assert str(caught.value).startswith(f"certificate of '{line}[speed=2]' failed: ")
 
 
 def test_a_study_takes_it_and_a_report_does_not_execute_it(line: str) -> None:

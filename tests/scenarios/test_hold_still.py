@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from types import MappingProxyType
 
 import numpy as np
 import pytest
+from makers.scenarios import metrics_of, put_robot, scenario_error
 
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_scenario
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
 from scenarios.hold_still import POSTURES, Postures
-
-Metrics = Callable[..., dict[str, float]]
 
 NOISY = "ideal[noise=0.003]"
 
@@ -49,34 +47,36 @@ def test_a_wrist_this_near_is_singular_to_first_order() -> None:
 
 @pytest.mark.parametrize("posture", ["start", "singular", "limit"])
 @pytest.mark.parametrize("law", ["pinv", "pinv[after=clip]", "dls", "nullspace", "qp", "lp-alpha"])
-def test_measured_exactly_no_law_moves(law: str, posture: str, metrics: Metrics) -> None:
+def test_measured_exactly_no_law_moves(law: str, posture: str) -> None:
     """No joint by more than 1e-6 rad in 10 s."""
     scenario = make_scenario(f"hold-still[posture={posture},dt=0.05]")
-    assert metrics(law, scenario)["joint_travel_rad"] < 1e-6
+    assert metrics_of(law, scenario)["joint_travel_rad"] < 1e-6
 
 
-def test_noise_next_to_a_singularity_makes_the_pseudo_inverse_jump(metrics: Metrics) -> None:
+def test_noise_next_to_a_singularity_makes_the_pseudo_inverse_jump() -> None:
     """Beyond the joints' limits on the UR5, where damping makes a hundredth of that."""
     scenario = make_scenario("hold-still[robot=ur5,posture=singular]")
-    free, damped = (metrics(law, scenario, NOISY)["velocity_peak_ratio"] for law in ("pinv", "dls"))
+    free, damped = (
+        metrics_of(law, scenario, NOISY)["velocity_peak_ratio"] for law in ("pinv", "dls")
+    )
     assert free > 1
     assert damped < 0.01 * free
 
 
-def test_noise_far_from_a_singularity_is_not_magnified(metrics: Metrics) -> None:
+def test_noise_far_from_a_singularity_is_not_magnified() -> None:
     """It lies in the range of J: ||J^+ J dq|| <= ||dq||, whatever the posture, times the gain."""
     scenario = make_scenario("hold-still[robot=ur5]")
     velocity = scenario.robot.limits.velocity
     assert velocity is not None
     # Of 6000 normal numbers none is above 5.5 deviations; six of them make a norm.
     most = 5.0 * 5.5 * 0.003 * np.sqrt(6) / velocity.upper.min()
-    assert metrics("pinv", scenario, NOISY)["velocity_peak_ratio"] < most
+    assert metrics_of("pinv", scenario, NOISY)["velocity_peak_ratio"] < most
 
 
-def test_noise_next_to_a_limit_sends_laws_that_know_it_off_course(metrics: Metrics) -> None:
+def test_noise_next_to_a_limit_sends_laws_that_know_it_off_course() -> None:
     """The joint seems to be outside and is told to come back; a law without limits stays calm."""
     scenario = make_scenario("hold-still[posture=limit]")
-    blind, knowing = metrics("pinv", scenario, NOISY), metrics("qp", scenario, NOISY)
+    blind, knowing = metrics_of("pinv", scenario, NOISY), metrics_of("qp", scenario, NOISY)
     assert blind["direction_error_max_rad"] < 0.05
     assert knowing["direction_error_max_rad"] > 1
     assert knowing["velocity_peak_ratio"] > 2 * blind["velocity_peak_ratio"]
@@ -89,14 +89,10 @@ def test_postures_that_are_not_near_are_refused(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(module, "POSTURES", MappingProxyType({"ur5": bent}))
     with pytest.raises(DikbenchError, match="smallest singular value"):
         make_scenario("hold-still[robot=ur5,posture=singular]")
-    monkeypatch.setattr(module, "NEAR", 0.5)
+    monkeypatch.setattr(module, "NEAR_RAD", 0.5)
     with pytest.raises(DikbenchError, match="position margin"):
         make_scenario("hold-still[robot=ur5,posture=limit]")
-    monkeypatch.setattr(
-        sys.modules["dikbench.scenario.family"],
-        "load_robot",
-        lambda name, frame: load_robot(name).with_limits(position=None),
-    )
+    put_robot(monkeypatch, load_robot("ur5").with_limits(position=None))
     with pytest.raises(DikbenchError, match="robot ur5 has no limits"):
         make_scenario("hold-still[robot=ur5,posture=limit]")
 
@@ -111,7 +107,4 @@ def test_postures_that_are_not_near_are_refused(monkeypatch: pytest.MonkeyPatch)
 )
 def test_errors_say_what_is_valid(selector: str, words: str) -> None:
     """One line each."""
-    with pytest.raises(DikbenchError) as caught:
-        make_scenario(selector)
-    assert words in str(caught.value)
-    assert "\n" not in str(caught.value)
+    assert words in scenario_error(selector)

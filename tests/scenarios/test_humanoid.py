@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pinocchio as pin
 import pytest
+from makers.scenarios import metrics_of, run_of
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
@@ -24,9 +24,7 @@ from dikbench.simulation.closed_loop import simulate
 from dikbench.simulation.status import Status
 from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, parse_solver
 from dikbench.solvers.checked_solve import make_solve
-from scenarios.humanoid import FEET
-
-Metrics = Callable[..., dict[str, float]]
+from scenarios.humanoid import FEET_FRAMES
 
 
 @cache
@@ -37,11 +35,7 @@ def standing() -> Scenario:
 
 def run(law: str, scenario: Scenario) -> Array:
     """The configurations of a time-indexed run in which every step is answered, (n + 1, nq)."""
-    formulation = make_formulation(law)
-    program = program_of(formulation)
-    solve = make_solve(None if program is None else parse_solver("daqp"), program)
-    done = simulate(scenario, formulation, solve, Ideal())
-    assert done.status is Status.OK
+    done = run_of(law, scenario)
     assert done.trace.share(Status.OK) == 1
     return done.trace.q
 
@@ -60,7 +54,7 @@ def slip(scenario: Scenario, q: Array) -> float:
     """The farthest that a foot is from where it was at the start: way and angle (m, rad)."""
     return max(
         float(np.abs(pin.log6(X.actInv(feet[0])).np).max())
-        for feet in (placements(scenario, foot, q) for foot in FEET)
+        for feet in (placements(scenario, foot, q) for foot in FEET_FRAMES)
         for X in feet
     )
 
@@ -88,7 +82,7 @@ def test_robot_is_talos_in_full() -> None:
     assert np.all(np.isfinite(velocity.upper[6:]))
     # The soles are on the ground, and level but for the 2 mrad that the posture's ankles have.
     scenario = standing()
-    for foot in FEET:
+    for foot in FEET_FRAMES:
         (X,) = placements(scenario, foot, robot.q0[None])
         assert X.translation[2] == pytest.approx(0.0, abs=1e-4)
         assert np.linalg.norm(pin.log3(X.rotation)) < 2e-3
@@ -140,10 +134,10 @@ def test_every_law_runs_on_a_free_base(law: str) -> None:
     assert done.trace.share(Status.NOT_VERIFIED) == done.trace.share(Status.SOLVER_FAILED) == 0
 
 
-def test_weights_give_way_where_priorities_do_not(metrics: Metrics) -> None:
+def test_weights_give_way_where_priorities_do_not() -> None:
     """The centre of mass, below the hand: kept by levels, given up by a hundredth of the weight."""
     scenario = make_scenario("humanoid[laps=1]")
-    strict, weighted = (metrics(law, scenario) for law in ("hqp", "qp"))
+    strict, weighted = (metrics_of(law, scenario) for law in ("hqp", "qp"))
     assert strict["second_task_error_rms"] < 1e-4
     assert weighted["second_task_error_rms"] > 50 * strict["second_task_error_rms"]
     assert weighted["position_error_max_m"] < 3e-3
@@ -174,14 +168,14 @@ def test_motion_that_leaves_the_ground_does_not_certify(monkeypatch: pytest.Monk
     compute = module.oracle_motion
     for place in (module, sys.modules["dikbench.scenario.family"]):
         monkeypatch.setattr(place, "oracle_motion", lambda *given: compute(*given[:4], PoseTask()))
-    with pytest.raises(DikbenchError, match=r"way that the feet move .* is false"):
+    with pytest.raises(DikbenchError, match=r"way that the feet move .*, must be"):
         make_scenario("humanoid[speed=0.5]")
 
 
 def test_robot_that_would_fall_does_not_certify(monkeypatch: pytest.MonkeyPatch) -> None:
     """On feet of half the length the centre of mass is too near to their edge."""
-    monkeypatch.setattr(sys.modules["scenarios.humanoid"], "SOLE", (0.07, 0.122))
-    with pytest.raises(DikbenchError, match=r"centre of mass above the feet .* is false"):
+    monkeypatch.setattr(sys.modules["scenarios.humanoid"], "SOLE_SIZE_M", (0.07, 0.122))
+    with pytest.raises(DikbenchError, match=r"centre of mass above the feet .*, must be"):
         make_scenario("humanoid")
 
 
@@ -190,7 +184,7 @@ def test_robot_that_would_fall_does_not_certify(monkeypatch: pytest.MonkeyPatch)
     [
         ("speed=1", "speed=1.0 must be 0.05 to 0.9"),
         ("radius=0.3", "radius=0.3 must be 0.02 to 0.15"),
-        ("robot=talos", "talos-humanoid"),
+        ("robot=talos", "unknown parameter of scenario humanoid 'robot'; valid: dt, gain"),
     ],
 )
 def test_what_cannot_be_is_one_line(selector: str, words: str) -> None:

@@ -7,31 +7,17 @@ import sys
 import numpy as np
 import pinocchio as pin
 import pytest
+from makers.scenarios import run_of
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.plugins.building import make_formulation, make_scenario
-from dikbench.problem import program_of
+from dikbench.plugins.building import make_scenario
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.robot import Robot
 from dikbench.scenario import Scenario
-from dikbench.scenario.plant import Ideal
-from dikbench.simulation.closed_loop import simulate
 from dikbench.simulation.status import STEP_CODE, Status
 from dikbench.simulation.trace import Trace
-from dikbench.solvers.catalogue.back_ends import parse_solver
-from dikbench.solvers.checked_solve import make_solve
 from scenarios.torque_limited import TorqueLimited
-
-
-def run(law: str, scenario: Scenario) -> Trace:
-    """A time-indexed run, ideal plant, daqp where the law needs a solver; it ends well."""
-    formulation = make_formulation(law)
-    program = program_of(formulation)
-    solve = make_solve(None if program is None else parse_solver("daqp"), program)
-    done = simulate(scenario, formulation, solve, Ideal())
-    assert done.status is Status.OK
-    return done.trace
 
 
 def usage(robot: Robot, q: Array, v: Array, v_prev: Array, dt: float) -> Array:
@@ -75,12 +61,12 @@ def test_qp_and_hqp_keep_the_torques_and_laws_without_limits_pass_them(robot: st
     """To 1e-6 at every step, none of them infeasible; the others by a tenth, in a tenth of them."""
     scenario = make_scenario(f"torque-limited[robot={robot}]")
     for law in ("qp", "hqp"):
-        trace = run(law, scenario)
+        trace = run_of(law, scenario).trace
         assert usage_of(trace, scenario).max() < 1 + 1e-6
         assert trace.share(Status.INFEASIBLE) == trace.share(Status.NOT_VERIFIED) == 0
         assert not trace.relaxed.any()
     for law in ("dls", "pinv"):
-        used = usage_of(run(law, scenario), scenario)
+        used = usage_of(run_of(law, scenario).trace, scenario)
         assert used.max() > 1.1
         assert np.mean(used > 1) > 0.1
 
@@ -93,7 +79,7 @@ def test_alpha_scaling_keeps_them_wherever_it_has_an_answer(law: str, robot: str
     Where it is not, the fallback brakes as fast as the torques allow.
     """
     scenario = make_scenario(f"torque-limited[robot={robot}]")
-    trace = run(law, scenario)
+    trace = run_of(law, scenario).trace
     used = usage_of(trace, scenario)
     infeasible = trace.status == STEP_CODE[Status.INFEASIBLE]
     assert used[~infeasible].max() < 1 + 1e-6
@@ -113,7 +99,7 @@ def test_lighter_payload_or_slower_lift_does_not_certify(
             patch.setattr(module, name, lambda *given, c=compute, f=factor: f * c(*given))
             if name == "_heaviest":  # in the time that suits the whole mass
                 patch.setattr(module, "_shortest", lambda *given: 0.4)
-            with pytest.raises(DikbenchError, match=r"torque of the motion over limit .* is false"):
+            with pytest.raises(DikbenchError, match=r"torque of the motion over limit .*, must be"):
                 make_scenario(f"torque-limited[robot={robot}]")
 
 
@@ -122,7 +108,7 @@ def test_payload_of_another_mass_does_not_certify(monkeypatch: pytest.MonkeyPatc
     module = sys.modules["scenarios.torque_limited"]
     compute = module._heaviest
     monkeypatch.setattr(module, "_heaviest", lambda *given: 1.1 * compute(*given))
-    with pytest.raises(DikbenchError, match=r"torque to hold it over limit .* is false"):
+    with pytest.raises(DikbenchError, match=r"torque to hold it over limit .*, must be"):
         make_scenario("torque-limited")
 
 

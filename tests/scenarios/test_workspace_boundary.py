@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable
-
 import numpy as np
 import pinocchio as pin
 import pytest
+from makers.problems import with_upper_limit
+from makers.scenarios import metrics_of, put_robot, scenario_error
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_scenario
-from dikbench.robots.catalogue import load_robot
 from dikbench.robots.robot import Robot
 from dikbench.scenario import Range, Scenario
 from dikbench.scenario.oracle import solve_placement
 from scenarios.workspace_boundary import WorkspaceBoundary
-
-Metrics = Callable[..., dict[str, float]]
 
 
 def _claims(scenario: Scenario) -> dict[str, float]:
@@ -93,22 +89,22 @@ def test_the_path_goes_out_along_the_ray_and_back(extent: float) -> None:
     assert speeds[0] == pytest.approx(0.0, abs=1e-12)
 
 
-def test_at_the_boundary_the_pseudo_inverse_runs_away_and_others_wait(metrics: Metrics) -> None:
+def test_at_the_boundary_the_pseudo_inverse_runs_away_and_others_wait() -> None:
     """Out and back on the Panda: a hundredfold speed, the QP inside the limits and as near."""
     scenario = make_scenario("workspace-boundary[robot=panda]")
     reach = _claims(scenario)["reach"]
-    free, kept = metrics("pinv", scenario), metrics("qp", scenario)
+    free, kept = metrics_of("pinv", scenario), metrics_of("qp", scenario)
     assert free["velocity_peak_ratio"] > 20
     assert kept["velocity_peak_ratio"] < 1 + 1e-6
     assert kept["position_error_max_m"] < 1.05 * 0.1 * reach
     assert free["position_error_max_m"] > 2 * kept["position_error_max_m"]
 
 
-def test_out_of_reach_damping_stretches_the_arm_and_stands_still(metrics: Metrics) -> None:
+def test_out_of_reach_damping_stretches_the_arm_and_stands_still() -> None:
     """A static target: DLS ends at the gap, at rest; pinv keeps thrashing."""
     scenario = make_scenario("workspace-boundary[robot=ur5,path=still]")
     gap = 0.1 * _claims(scenario)["reach"]
-    damped, free = metrics("dls", scenario), metrics("pinv", scenario)
+    damped, free = metrics_of("dls", scenario), metrics_of("pinv", scenario)
     assert damped["position_error_final_m"] == pytest.approx(gap, rel=0.05)
     assert damped["sigma_min"] < 1e-6
     assert free["joint_travel_rad"] > 20 * damped["joint_travel_rad"]
@@ -124,14 +120,7 @@ def test_a_target_within_reach_is_refused(monkeypatch: pytest.MonkeyPatch) -> No
 
 def test_a_boundary_that_is_a_limit_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the elbow's limit comes before the stretched arm."""
-    module = sys.modules["dikbench.scenario.family"]
-    arm = load_robot("panda")
-    position = arm.limits.position
-    assert position is not None
-    upper = position.upper.copy()
-    upper[3] = -0.6
-    narrow = arm.with_limits(position=(position.lower, upper))
-    monkeypatch.setattr(module, "load_robot", lambda name, frame: narrow)
+    put_robot(monkeypatch, with_upper_limit("panda", 3, -0.6))
     with pytest.raises(DikbenchError, match="position margin up to there"):
         make_scenario("workspace-boundary")
 
@@ -147,7 +136,4 @@ def test_a_boundary_that_is_a_limit_is_refused(monkeypatch: pytest.MonkeyPatch) 
 )
 def test_errors_say_what_is_valid(selector: str, words: str) -> None:
     """One line each."""
-    with pytest.raises(DikbenchError) as caught:
-        make_scenario(selector)
-    assert words in str(caught.value)
-    assert "\n" not in str(caught.value)
+    assert words in scenario_error(selector)

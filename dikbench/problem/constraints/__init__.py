@@ -1,4 +1,4 @@
-"""What a robot must not do beyond the limits of its joints: one constraint per file."""
+"""Constraints in addition to the joint limits; one constraint per file."""
 
 from dikbench.problem.constraints.collision import CollisionConstraint
 from dikbench.problem.constraints.constraint import Constraint, linearize_all

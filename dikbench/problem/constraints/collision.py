@@ -1,4 +1,4 @@
-"""Distances from obstacles and between the robot's own links, linear in one step's velocity."""
+"""Distances from obstacles and between the robot's own links, as rows G v <= h."""
 
 from __future__ import annotations
 
@@ -16,54 +16,51 @@ from dikbench.robots.braking import viable_brake
 from dikbench.robots.collision.obstacles import Obstacle
 from dikbench.robots.collision.pairs import CollisionPairs
 from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.limits import WAY_BACK_SPEED_SHARE
 from dikbench.robots.robot import Robot
 
-STILL: Final = 1e-6
-"""A gradient up to this [m/rad] moves nothing: its pair has no say."""
+SMALLEST_GRADIENT_M_RAD: Final = 1e-6
+"""A pair whose distance has a smaller gradient is left out, since no joint changes it."""
 
-WAY_BACK: Final = 0.1
-"""Share of the speed that the velocity limits allow at which a distance below the margin grows."""
+BRAKING_ACCELERATION_SHARE: Final = 0.5
+"""Share of the acceleration limits that a row uses to brake, since other rows brake as well."""
 
-BRAKING: Final = 0.5
-"""Share of the acceleration limits that a row counts on: other rows have joints to brake, too."""
-
-UNLIMITED: Final = 1.0
-"""Speed [rad/s or m/s] that counts for joints without a velocity limit on the way back."""
+UNLIMITED_JOINT_SPEED: Final = 1.0
+"""Speed of a joint without a velocity limit when a distance below the margin is left [rad/s,
+m/s]."""
 
 
 @dataclass(frozen=True)
 class CollisionConstraint:
-    """The robot keeps clear of obstacles and of itself.
+    """Keep the robot clear of obstacles and of itself.
 
         -g . v <= (phi - margin)/dt,   g = dphi/dq = n^T (J_b - J_a)
 
     for each pair of bodies, or of a body and an obstacle, whose signed distance phi [m] is below
     the influence distance (see `dikbench.robots.collision.pairs`; the bodies are those of
-    `dikbench.robots.collision.bodies`). Any velocity inside keeps phi above the margin but for the
-    second-order term of the step, phi(q + v dt) - phi(q) - g . v dt, which `remainders` measures.
-    Below the margin the row asks for the way back, -g . v <= max((phi - margin)/dt, -rate), with
-    rate a tenth of the speed that the velocity limits allow, 0.1 sum_i |g_i| vmax_i (1 rad/s for
-    joints without a limit). Bodies so deep in an obstacle that their ways out contradict each other
-    leave no velocity: an infeasible step. Farther than the influence distance, or where no joint
-    changes the distance to first order, the row is vacuous: 0 v <= 1.
+    `dikbench.robots.collision.bodies`). A velocity that keeps the rows keeps phi above the
+    margin up to the second-order term of the step, phi(q + v dt) - phi(q) - g . v dt, which
+    `remainders` measures. Below the margin the row lets the distance grow again,
+    -g . v <= max((phi - margin)/dt, -rate), with rate a tenth of the speed that the velocity limits
+    allow, 0.1 sum_i |g_i| vmax_i (1 rad/s for joints without a limit). Bodies so deep in an
+    obstacle that their rows contradict each other make the step infeasible. Beyond the influence
+    distance, or where no joint changes the distance to first order, the row constrains nothing: 0 v
+    <= 1.
 
-    Where acceleration limits are in force the row brakes as `viable_brake` does,
-    counting on half of what they allow, 0.5 sum_i |g_i| a_i [m/s^2], and asks for no more change
-    of g . v in this step than that; a distance that is missed by joints that brake so slowly, or
-    that had no row early enough, then falls below the margin.
+    Where acceleration limits are in force the row brakes as `viable_brake` does, with half of what
+    they allow, 0.5 sum_i |g_i| a_i [m/s^2], and requires no larger change of g . v in this step;
+    where that is too slow, or a pair gets its row too late, the distance falls below the margin.
 
-    With more pairs than `rows` the nearest ones have the rows. A pair nearer than the influence
-    distance is then without a row only while `rows` others are nearer than it is.
-
-    A greedy constraint: it stops a robot in front of an obstacle, it does not plan a way round.
+    With more pairs than `rows` the nearest ones have the rows. The constraint is local: it stops a
+    robot in front of an obstacle and does not plan a path around it.
 
     Attributes:
-        obstacles: what stands in the world.
+        obstacles: obstacles in the world.
         self_collision: whether the robot's bodies keep clear of each other.
         margin: distance to keep [m].
-        influence: distance below which a pair has a row [m]; to be larger than the margin by what
-            two bodies can come nearer in one step, or while they brake.
-        rows: number of rows, if there are so many pairs.
+        influence: distance below which a pair has a row [m]; it must exceed the margin by as much
+            as two bodies can approach in one step, or while they brake.
+        rows: largest number of rows.
 
     Source: Faverjon & Tournassoud 1987 (velocity damper); Kanoun et al. 2011.
     """
@@ -91,7 +88,7 @@ class CollisionConstraint:
             raise DikbenchError(f"CollisionConstraint: rows={self.rows} must be at least 1")
 
     def pairs(self, robot: Robot) -> CollisionPairs:
-        """The pairs that the constraint is about.
+        """Return the pairs of bodies and obstacles that the constraint is about.
 
         Raises:
             DikbenchError: if there are none.
@@ -109,7 +106,7 @@ class CollisionConstraint:
         robot = kinematics.robot
         pairs = _pairs(self, robot)
         phi = pairs.distances(kinematics)
-        if len(phi) > self.rows:  # in their own order, so that a pair keeps its row for long
+        if len(phi) > self.rows:  # in the order of the pairs, so that a pair keeps its row
             chosen = np.sort(np.argpartition(phi, self.rows)[: self.rows])
         else:
             chosen = np.arange(len(phi))
@@ -118,7 +115,7 @@ class CollisionConstraint:
         if len(near):
             g = pairs.gradients(kinematics, chosen[near])
             length = np.linalg.norm(g, axis=1)
-            moving = length > STILL
+            moving = length > SMALLEST_GRADIENT_M_RAD
             near, g, length = near[moving], g[moving], length[moving]
             room = _room(robot, phi[chosen[near]] - self.margin, g, v_prev, dt)
             G[near] = -g / length[:, None]
@@ -126,7 +123,7 @@ class CollisionConstraint:
         return G, h
 
     def distances(self, robot: Robot, q: Array) -> Array:
-        """The smallest distance over all pairs at each configuration (n, nq), (n,) [m]."""
+        """Compute the smallest distance over all pairs at configurations (n, nq), (n,) [m]."""
         pairs, kinematics = _pairs(self, robot), Kinematics(robot)
         smallest = []
         for configuration in q:
@@ -135,12 +132,12 @@ class CollisionConstraint:
         return np.array(smallest)
 
     def remainders(self, robot: Robot, q: Array) -> Array:
-        """What the linearisation leaves out of each step of a motion (n + 1, nq).
+        """Compute what the linearisation leaves out of each step of a motion (n + 1, nq).
 
             phi(q_(k+1)) - phi(q_k) - g(q_k) . (q_(k+1) - q_k)
 
-        of the pairs that are below the influence distance at the start of the step, 0 elsewhere.
-        A motion whose steps keep the rows stays above margin + min(remainders) [m] where no
+        for pairs that are below the influence distance at the start of the step, 0 for others. A
+        motion whose steps keep the rows stays above margin + min(remainders) [m] where no
         acceleration limits soften them.
 
         Returns:
@@ -160,7 +157,7 @@ class CollisionConstraint:
 
 
 def _room(robot: Robot, spare: Array, g: Array, v_prev: Array | None, dt: float) -> Array:
-    """How fast each pair may come nearer, (k,) [m/s], negative where it has to part.
+    """Compute how fast each pair may approach, (k,) [m/s]; negative: it must part.
 
     Args:
         robot: the robot, with its limits.
@@ -171,11 +168,11 @@ def _room(robot: Robot, spare: Array, g: Array, v_prev: Array | None, dt: float)
     """
     room, can = spare / dt, np.abs(g)
     if room.min(initial=0.0) < 0:
-        room = np.maximum(room, -WAY_BACK * can @ _speeds(robot))
+        room = np.maximum(room, -WAY_BACK_SPEED_SHARE * can @ _speeds(robot))
     acceleration = robot.limits.acceleration
     if acceleration is None or v_prev is None:
         return room
-    brake = BRAKING * can @ np.minimum(acceleration.upper, -acceleration.lower)
+    brake = BRAKING_ACCELERATION_SHARE * can @ np.minimum(acceleration.upper, -acceleration.lower)
     room = np.minimum(room, viable_brake(spare, brake, dt))
     braked: Array = np.maximum(room, -g @ v_prev - brake * dt)
     return braked
@@ -199,9 +196,9 @@ def _pairs(constraint: CollisionConstraint, robot: Robot) -> CollisionPairs:
 
 @lru_cache(maxsize=32)
 def _speeds(robot: Robot) -> Array:
-    """The joints' largest speeds, (nv,), for the way back."""
+    """Return the joints' largest speeds on the way back inside, (nv,) [rad/s or m/s]."""
     limit = robot.limits.velocity
     if limit is None:
-        return np.full(robot.nv, UNLIMITED)
+        return np.full(robot.nv, UNLIMITED_JOINT_SPEED)
     speeds = np.minimum(limit.upper, -limit.lower)
-    return np.where(np.isfinite(speeds), speeds, UNLIMITED)
+    return np.where(np.isfinite(speeds), speeds, UNLIMITED_JOINT_SPEED)

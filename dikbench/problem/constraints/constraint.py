@@ -12,7 +12,7 @@ from dikbench.robots.kinematics import Kinematics
 
 
 class Constraint(Protocol):
-    """What the motion must keep beside the limits of its joints: a frozen dataclass.
+    """A condition on the motion in addition to the joint limits: a frozen dataclass.
 
     The number of rows is the same at every configuration, so that a solver can keep its workspace.
     """
@@ -20,7 +20,7 @@ class Constraint(Protocol):
     def linearize(
         self, kinematics: Kinematics, v_prev: Array | None, dt: float
     ) -> tuple[Array, Array]:
-        """Rows G v <= h on the velocity of one control step.
+        """Compute the rows G v <= h on the velocity of one control step.
 
         Args:
             kinematics: at the configuration.
@@ -28,8 +28,7 @@ class Constraint(Protocol):
             dt: control period [s].
 
         Returns:
-            G (p, nv), each row of unit length or zero, and h (p,): a residual of a row is in rad/s
-            (m/s), whatever the constraint is about.
+            G (p, nv), each row of unit length or zero, and h (p,) [rad/s or m/s].
         """
         ...
 
@@ -37,7 +36,7 @@ class Constraint(Protocol):
 def linearize_all(
     constraints: Sequence[Constraint], kinematics: Kinematics, v_prev: Array | None, dt: float
 ) -> tuple[Array | None, Array | None]:
-    """The rows of several constraints below each other; (None, None) where there is none."""
+    """Stack the rows of several constraints; return (None, None) where there is none."""
     if not constraints:
         return None, None
     parts = [constraint.linearize(kinematics, v_prev, dt) for constraint in constraints]
@@ -48,7 +47,7 @@ def linearize_all(
 
 
 def unit_rows(G: Array, h: Array) -> tuple[Array, Array]:
-    """The same half-spaces with rows of unit length; rows of zeros are left as they are."""
+    """Scale the rows of G v <= h to unit length; leave rows of zeros as they are."""
     length = np.linalg.norm(G, axis=1)
     scale = np.divide(1.0, length, out=np.ones_like(length), where=length > 0)
     return G * scale[:, None], h * scale

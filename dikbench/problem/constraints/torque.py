@@ -17,14 +17,14 @@ from dikbench.robots.robot import Robot
 
 @dataclass(frozen=True)
 class TorqueConstraint:
-    """The joints' torques stay within the effort limits of the robot.
+    """Keep the joint torques within the effort limits of the robot.
 
         tau = M(q) (v - v_prev)/dt + b(q, v_prev),   tau_min <= tau <= tau_max
 
-    with M the mass matrix and b gravity, centrifugal and Coriolis torques at the start of the step:
-    what the joints must exert to change the velocity from v_prev to v within it. A row per finite
-    effort limit, the upper ones first, [N m or N] before they are scaled. An unknown v_prev counts
-    as rest.
+    with M the mass matrix and b the gravity, centrifugal and Coriolis torques at the start of the
+    step: the torques that change the velocity from v_prev to v within it. There is a row per finite
+    effort limit, the upper ones first, in N m (N) before it is scaled. An unknown v_prev counts as
+    rest.
 
     Source: R. Featherstone, Rigid Body Dynamics Algorithms, Springer 2008 (equation of motion).
     """
@@ -43,20 +43,20 @@ class TorqueConstraint:
         rest = np.zeros(robot.nv)
         before = rest if v_prev is None else v_prev
         M = mass_matrix(robot, q)
-        # What the torque is at v = 0: the step that stops the robot.
+        # The torque at v = 0, of the step that stops the robot.
         stop = pin.rnea(robot.model, robot.scratch, q, before, -before / dt)
         G = np.vstack([M[above], -M[below]]) / dt
         h = np.concatenate([(limit.upper - stop)[above], (stop - limit.lower)[below]])
         return unit_rows(G, h)
 
     def torques(self, robot: Robot, q: Array, v: Array, v_prev: Array, dt: float) -> Array:
-        """Torques of the steps of a motion by the recursive Newton-Euler algorithm.
+        """Compute the torques of a motion by the recursive Newton-Euler algorithm.
 
         Args:
             robot: the robot.
             q: configurations at the start of each step, (n, nq).
-            v: velocities applied in it, (n, nv).
-            v_prev: the velocities before, (n, nv).
+            v: velocities applied in each step, (n, nv).
+            v_prev: velocities applied before each step, (n, nv).
             dt: control period [s].
 
         Returns:
@@ -71,7 +71,7 @@ class TorqueConstraint:
 
 
 def effort_limits(robot: Robot) -> Interval:
-    """The effort limits in force, at least one of which is finite.
+    """Return the effort limits in force, at least one of which is finite.
 
     Raises:
         DikbenchError: if there are none.
@@ -86,6 +86,6 @@ def effort_limits(robot: Robot) -> Interval:
 
 
 def mass_matrix(robot: Robot, q: Array) -> Array:
-    """The joint-space mass matrix M(q), (nv, nv), symmetric."""
+    """Compute the joint-space mass matrix M(q), (nv, nv), symmetric."""
     upper: Array = np.triu(pin.crba(robot.model, robot.scratch, q))
     return upper + np.triu(upper, 1).T

@@ -1,4 +1,4 @@
-"""What can be wanted of a robot: one task per file."""
+"""Tasks: what a robot is to do; one task per file."""
 
 from dikbench.problem.tasks.centre_of_mass import CentreOfMassTask
 from dikbench.problem.tasks.damping import DampingTask

@@ -1,4 +1,4 @@
-"""The centre of mass at a wanted point."""
+"""The centre of mass at a desired point."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from dikbench.robots.robot import checked_vector
 class CentreOfMassTask:
     """Bring the centre of mass of the robot to a point: e = c* - c, V = gain e, J v = V.
 
-    All in the axes of the world: c (3,) [m], and J (3, nv) the Jacobian of c.
+    c (3,) [m] and its Jacobian J (3, nv) are in the axes of the world.
 
     Attributes:
         target: the point c*, (3,) [m].
         gain: 1/s.
         weight: see `LinearizedTask`.
-        priority: see `LinearizedTask`; by default below the task of the end effector.
+        priority: see `LinearizedTask`; by default below the end-effector task.
     """
 
     target: Array
@@ -32,13 +32,13 @@ class CentreOfMassTask:
     priority: int = 2
 
     def __post_init__(self) -> None:
-        """Check the target, and keep a copy that nobody writes to."""
+        """Check the target and keep a read-only copy of it."""
         target = checked_vector(self.target, 3, "centre-of-mass task")
         target.flags.writeable = False
         object.__setattr__(self, "target", target)
 
     def linearize(self, kinematics: Kinematics) -> LinearizedTask:
-        """The task at the configuration of `kinematics`.
+        """Linearise the task at the configuration of `kinematics`.
 
         Raises:
             DikbenchError: if the robot has no mass, or the weights are not one or three.

@@ -1,4 +1,4 @@
-"""Joints that should rather not move."""
+"""A task that keeps the joints at rest."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ class DampingTask:
     """Keep the joints at rest: V = 0 (J = I), with weight lambda^2 Tikhonov's regularisation.
 
     Attributes:
-        weight: see `LinearizedTask`; one per joint (nv,) for joints that move unlike readily.
-        priority: see `LinearizedTask`; by default below the task of the end effector.
+        weight: see `LinearizedTask`; one number, or one per joint (nv,).
+        priority: see `LinearizedTask`; by default below the end-effector task.
     """
 
     weight: float | Array = 1.0
     priority: int = 2
 
     def linearize(self, kinematics: Kinematics) -> LinearizedTask:
-        """The task, which is the same at every configuration.
+        """Linearise the task, which is the same at every configuration.
 
         Raises:
             DikbenchError: if the weights do not fit the robot.

@@ -1,4 +1,4 @@
-"""A frame at a wanted placement."""
+"""A frame at a desired placement."""
 
 from __future__ import annotations
 
@@ -10,51 +10,34 @@ import pinocchio as pin
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.problem.tasks.task import LinearizedTask, check_weight
+from dikbench.problem.tasks.task import FrameTask, LinearizedTask, check_weight
 from dikbench.robots.kinematics import Kinematics
-from dikbench.robots.robot import Robot, frame_id
+from dikbench.robots.robot import Robot
 
 
 @dataclass(frozen=True, eq=False)
-class PoseTask:
+class PoseTask(FrameTask):
     """Bring a frame of the robot to a placement in the world.
 
         e = log6(X^-1 X_d),   V = Ad(X^-1 X_d) V_d + gain e,   J v = V
 
     with X the placement of the frame, X_d the target, V_d the target's own body twist and J the
     body Jacobian: twists are (linear; angular) [m/s; rad/s] in the axes of the frame. On an arm
-    that cannot move some rows of the twist at all (`Robot.task_rows`) those rows are left out.
+    that cannot move some rows of the twist (`Robot.task_rows`) they are left out.
 
-    Attributes:
-        target: placement X_d (`pinocchio.SE3`); None: given to `linearize` at every step.
-        gain: 1/s.
-        weight: see `LinearizedTask`.
-        priority: see `LinearizedTask`.
-        frame: name of the frame; None: the robot's task frame.
+    The target is a placement X_d (`pinocchio.SE3`).
     """
 
-    target: Any = None
-    gain: float = 1.0
-    weight: float | Array = 1.0
-    priority: int = 1
-    frame: str | None = None
-
     def rows(self, robot: Robot) -> tuple[int, ...]:
-        """The rows of the twist (linear; angular) that the task is about."""
+        """See `FrameTask`."""
         return robot.task_rows
 
     def linearize(
         self, kinematics: Kinematics, target: Any = None, velocity: Any = None
     ) -> LinearizedTask:
-        """The task at the configuration of `kinematics`.
-
-        Args:
-            kinematics: the robot at its configuration.
-            target: this step's placement; default: the task's own.
-            velocity: the target's body twist V_d (`pinocchio.Motion`); None: at rest.
-        """
+        """See `FrameTask`."""
         robot = kinematics.robot
-        index = robot.frame_id if self.frame is None else frame_id(robot.model, self.frame)
+        index = self.frame_id(robot)
         X_d = self.target if target is None else target
         if not isinstance(X_d, pin.SE3):
             raise DikbenchError(

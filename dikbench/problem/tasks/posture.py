@@ -1,4 +1,4 @@
-"""A posture that the joints should take."""
+"""A desired posture of the joints."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from dikbench.errors import DikbenchError
 from dikbench.linear_algebra import scaled_identity
 from dikbench.problem.tasks.task import LinearizedJointTask, LinearizedTask, check_weight
 from dikbench.robots.kinematics import Kinematics
-from dikbench.robots.robot import Robot
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,8 +21,8 @@ class PostureTask:
     Attributes:
         target: the posture q*, (nq,).
         gain: 1/s.
-        weight: see `LinearizedTask`; one per joint (nv,) for joints that matter unlike.
-        priority: see `LinearizedTask`; by default below the task of the end effector.
+        weight: see `LinearizedTask`; one number, or one per joint (nv,).
+        priority: see `LinearizedTask`; by default below the end-effector task.
     """
 
     target: Array
@@ -38,7 +37,7 @@ class PostureTask:
             raise DikbenchError(f"posture task: expected finite numbers, got {target}")
 
     def linearize(self, kinematics: Kinematics) -> LinearizedTask:
-        """The task at the configuration of `kinematics`.
+        """Linearise the task at the configuration of `kinematics`.
 
         Raises:
             DikbenchError: if the target is not an array of the robot's shape (nq,), or the weights
@@ -53,17 +52,3 @@ class PostureTask:
         return LinearizedJointTask(
             scaled_identity(robot.nv, 1.0), self.gain * error, error, self.weight, self.priority
         )
-
-
-def middle_posture(robot: Robot) -> Array:
-    """The middle of the position limits, (nq,), the target of joint centring.
-
-    Raises:
-        DikbenchError: if a joint has no position limits.
-    """
-    middle = robot.limits.middle
-    if middle is None or np.isnan(middle).any():
-        raise DikbenchError(f"robot {robot.name}: not every joint has position limits to centre")
-    posture = robot.q0.copy()
-    posture[robot.limits.q_index] = middle
-    return posture

@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import msgspec
 import numpy as np
+import pinocchio as pin
 import scipy.linalg
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.linear_algebra import scaled_identity
 from dikbench.robots.kinematics import Kinematics
-from dikbench.robots.robot import Robot
+from dikbench.robots.robot import Robot, frame_id
 
 
 class LinearizedTask(msgspec.Struct, eq=False):
-    """A task at one configuration: J v = V.
+    """A task at one configuration, J v = V, with the desired velocity V.
 
     Attributes:
         J: task Jacobian, (m, nv).
-        V: wanted task velocity, (m,) [m/s; rad/s]: gain times error plus feed-forward.
+        V: desired task velocity, (m,) [m/s; rad/s]: gain times error plus feed-forward.
         error: task error, (m,) [m; rad], zero when the task is done.
         weight: multiplies the squared norm ||J v - V||^2 where tasks compete: one number, or one
             per row (m,).
@@ -38,42 +40,35 @@ class LinearizedTask(msgspec.Struct, eq=False):
     def log_derivative(self) -> Array | None:
         """The (m, m) matrix Jl of d(error)/dt = -Jl J v; None where it is the identity.
 
-        Multiplying both sides of J v = V by it changes nothing for one full-rank task without
-        active bounds (Jl e = e), and something under damping, competing weights, rank loss.
+        Multiplying both sides of J v = V by it (Jl e = e) has no effect on one full-rank task
+        without active bounds, but does under damping, competing weights and rank loss.
         """
         return None
 
     def normal_equations(self, *, log_derivative: bool = False) -> tuple[Array, Array]:
-        """J^T W J, (nv, nv), and J^T W V, (nv,): the task's share of a least-squares cost.
-
-        To be read, not written to: some tasks have the same matrix in every step.
+        """Compute J^T W J, (nv, nv), and J^T W V, (nv,), the task's part of a least-squares cost.
 
         Args:
-            log_derivative: whether to multiply J and V by the matrix of that name first.
+            log_derivative: whether to multiply J and V by that matrix first.
         """
         J, V = self.J, self.V
         Jl = self.log_derivative if log_derivative else None
         if Jl is not None:
             J, V = Jl @ J, Jl @ V
-        weighted = J.T if type(self.weight) is float and self.weight == 1.0 else J.T * self.weight
+        weighted = J.T * self.weight
         return weighted.dot(J), weighted.dot(V)
 
 
 class LinearizedJointTask(LinearizedTask, eq=False):
-    """A task on the joint velocities themselves: J is the identity (shared: not to be written to).
-
-    The weights are one number or one per joint, (nv,).
-    """
+    """A task on the joint velocities: J is the identity, read-only; weights are one or (nv,)."""
 
     def normal_equations(self, *, log_derivative: bool = False) -> tuple[Array, Array]:
-        """W and W V (see `LinearizedTask`): nothing to multiply."""
-        if type(self.weight) is float:
-            return scaled_identity(len(self.V), self.weight), self.V * self.weight
+        """Compute W and W V (see `LinearizedTask`)."""
         return self.J * self.weight, self.V * self.weight
 
 
 def check_weight(task: str, weight: float | Array, rows: int) -> None:
-    """Check the weight of a task with so many rows, named for the message.
+    """Check the weight of a task with a number of rows; `task` names it in the message.
 
     Raises:
         DikbenchError: if it is not one finite number, at least 0, or one such number per row.
@@ -93,7 +88,7 @@ def check_weight(task: str, weight: float | Array, rows: int) -> None:
 
 
 class Task(Protocol):
-    """What is wanted: a frozen dataclass with at least these fields."""
+    """What is desired: a frozen dataclass with at least these members."""
 
     @property
     def priority(self) -> int:
@@ -101,12 +96,12 @@ class Task(Protocol):
         ...
 
     def linearize(self, kinematics: Kinematics) -> LinearizedTask:
-        """The task at the configuration of `kinematics`."""
+        """Return the task at the configuration of `kinematics`."""
         ...
 
 
 class TrackingTask(Task, Protocol):
-    """A task whose target moves: it is handed to `linearize` at every step."""
+    """A task whose target moves and is given to `linearize` at every step."""
 
     @property
     def gain(self) -> float:
@@ -114,18 +109,77 @@ class TrackingTask(Task, Protocol):
         ...
 
     def rows(self, robot: Robot) -> tuple[int, ...]:
-        """The rows of the twist (linear; angular) of the task frame that it is about."""
+        """Return the rows of the task frame's twist (linear; angular) that it is about."""
         ...
 
     def linearize(
         self, kinematics: Kinematics, target: Any = None, velocity: Any = None
     ) -> LinearizedTask:
-        """The task at the configuration of `kinematics`, its target and the target's body twist."""
+        """Linearise the task for a target and its body twist (see `FrameTask`)."""
         ...
 
 
+@dataclass(frozen=True, eq=False)
+class FrameTask(ABC):
+    """A task on a frame of the robot, in the axes of the frame.
+
+    Attributes:
+        target: where the frame is to be; None: given to `linearize` at every step.
+        gain: 1/s.
+        weight: see `LinearizedTask`.
+        priority: see `LinearizedTask`.
+        frame: name of the frame; None: the robot's task frame.
+    """
+
+    target: Any = None
+    gain: float = 1.0
+    weight: float | Array = 1.0
+    priority: int = 1
+    frame: str | None = None
+
+    @abstractmethod
+    def rows(self, robot: Robot) -> tuple[int, ...]:
+        """Return the rows of the twist (linear; angular) that the task is about."""
+
+    @abstractmethod
+    def linearize(
+        self, kinematics: Kinematics, target: Any = None, velocity: Any = None
+    ) -> LinearizedTask:
+        """Linearise the task at the configuration of `kinematics`.
+
+        Args:
+            kinematics: the robot at its configuration.
+            target: this step's target; default: the task's own.
+            velocity: the target's body twist V_d (`pinocchio.Motion`); None: at rest.
+
+        Raises:
+            DikbenchError: if the target, the weights or the frame do not fit.
+        """
+
+    def frame_id(self, robot: Robot) -> int:
+        """Return Pinocchio's index of the frame.
+
+        Raises:
+            DikbenchError: if the robot has no frame of this name.
+        """
+        return robot.frame_id if self.frame is None else frame_id(robot.model, self.frame)
+
+
+def part_of_target(target: Any, part: str, shape: tuple[int, ...], expected: str) -> Array:
+    """Return the rotation or translation of a target, an SE3 or an array of this part's shape.
+
+    Raises:
+        DikbenchError: if it is neither; `expected` names the task and the array.
+    """
+    found: Array = getattr(target, part) if isinstance(target, pin.SE3) else target
+    if not isinstance(found, np.ndarray) or found.shape != shape:
+        got = getattr(found, "shape", type(found).__name__)
+        raise DikbenchError(f"{expected} or a pinocchio.SE3, got {got}")
+    return found
+
+
 def stacked(tasks: list[LinearizedTask]) -> LinearizedTask:
-    """Several tasks of one priority as one task, rows below each other."""
+    """Stack several tasks of one priority, rows below each other."""
     if len(tasks) == 1:
         return tasks[0]
     return _StackedTask(

@@ -1,4 +1,4 @@
-"""A tracking task and others of the same priority, as one."""
+"""A tracking task and others of the same priority as one task."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dikbench.robots.robot import Robot
 
 @dataclass(frozen=True, eq=False)
 class TrackingTogether:
-    """A tracking task with tasks that are to be done with it, such as feet that stay: rows stacked.
+    """A tracking task stacked with tasks of its priority, such as feet that stay in place.
 
     Attributes:
         tracking: the task whose target moves.
@@ -24,16 +24,16 @@ class TrackingTogether:
 
     @property
     def gain(self) -> float:
-        """That of the tracking, 1/s."""
+        """Gain of the tracking task, 1/s."""
         return self.tracking.gain
 
     @property
     def priority(self) -> int:
-        """That of the tracking."""
+        """Priority of the tracking task."""
         return self.tracking.priority
 
     def rows(self, robot: Robot) -> tuple[int, ...]:
-        """The rows of the twist of the task frame that the tracking is about."""
+        """Return the rows of the task frame's twist (linear; angular) that are tracked."""
         return self.tracking.rows(robot)
 
     def linearize(

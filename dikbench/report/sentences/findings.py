@@ -20,7 +20,8 @@ from dikbench.report.sentences.words import (
     number,
     several,
 )
-from dikbench.statistics.stability import DRIFT, STABLE
+from dikbench.statistics.stability import LARGEST_DRIFT_SHARE as DRIFT
+from dikbench.statistics.stability import STABLE
 from dikbench.statistics.trial_matrix import CONTENDER
 
 ON_COURSE: Final = math.radians(1.0)

@@ -1,4 +1,4 @@
-"""The bodies of a robot: what must not touch an obstacle, or another of them."""
+"""The bodies of a robot, which must not touch an obstacle or each other."""
 
 from __future__ import annotations
 
@@ -16,23 +16,22 @@ from dikbench.robots.collision.enclosing_capsule import enclosing_capsule
 from dikbench.robots.collision.obstacles import capsule
 from dikbench.robots.robot import Robot
 
-LINK_RADIUS: Final = 0.04
-"""Of the links of a robot without collision geometry [m]."""
+LINK_RADIUS_M: Final = 0.04
+"""Radius of the links of a robot without collision geometry."""
 
-POINT: Final = 1e-3
-"""A link shorter than this [m] has no body of its own."""
+SHORTEST_LINK_M: Final = 1e-3
+"""A shorter link has no body of its own."""
 
 
 def collision_bodies(robot: Robot) -> Any:
-    """The bodies of a robot, as a `pinocchio.GeometryModel` for its model, without pairs.
+    """Build the bodies of a robot, a `pinocchio.GeometryModel` for its model, without pairs.
 
-    Those of its URDF's collision geometry: primitive shapes as they are, around each mesh a capsule
-    that contains all its vertices (and with them the mesh, a capsule being convex), so that
-    distances are never larger than the mesh's. Without a URDF: capsules of radius 0.04 m along the
-    links, from each joint to the next ones.
+    Primitive shapes of its URDF's collision geometry are kept; a mesh is replaced by a capsule that
+    contains all its vertices, so that distances are never larger than the mesh's. Without a URDF
+    the bodies are capsules of radius 0.04 m along the links, from each joint to the next ones.
 
     Raises:
-        DikbenchError: if a mesh is missing, or there is nothing to make bodies of.
+        DikbenchError: if a mesh is missing, or there is no geometry and no link.
     """
     bodies = _from_urdf(robot) if robot.urdf else _along_links(robot.model)
     if not len(bodies.geometryObjects):
@@ -52,7 +51,7 @@ def _from_urdf(robot: Robot) -> Any:
 
 @lru_cache(maxsize=8)
 def _fitted(urdf: str) -> tuple[Any, Any]:
-    """The model of a URDF, all joints moving, and its collision geometry with fitted capsules."""
+    """Load a URDF, all joints moving, and fit capsules to its collision geometry."""
     # A package:// path starts at one of the folders above the file.
     folders = [str(folder) for folder in Path(urdf).resolve().parents]
     with captured_stderr() as complaints:
@@ -81,14 +80,14 @@ def _along_links(model: Any) -> Any:
     bodies = pin.GeometryModel()
     for joint in range(1, model.njoints):
         for number, end in enumerate(_ends(model, joint)):
-            shape, placement = capsule(np.zeros(3), end, LINK_RADIUS)
+            shape, placement = capsule(np.zeros(3), end, LINK_RADIUS_M)
             name = f"{model.names[joint]}_{number}"
             bodies.addGeometryObject(pin.GeometryObject(name, joint, placement, shape))
     return bodies
 
 
 def _ends(model: Any, joint: int) -> list[Array]:
-    """Where the links of a joint end: at the next joints or, where there is none, at its frames."""
+    """Return where the links of a joint end: at the next joints, or else at its frames."""
     ends = [model.jointPlacements[child].translation for child in model.children[joint]]
     if not ends:
         ends = [
@@ -98,6 +97,6 @@ def _ends(model: Any, joint: int) -> list[Array]:
         ]
     kept: list[Array] = []
     for end in ends:
-        if all(np.linalg.norm(end - other) > POINT for other in [np.zeros(3), *kept]):
+        if all(np.linalg.norm(end - other) > SHORTEST_LINK_M for other in [np.zeros(3), *kept]):
             kept.append(end)
     return kept

@@ -1,4 +1,4 @@
-"""A capsule around a cloud of points: cheap and smooth to keep clear of, and never too small."""
+"""The smallest capsule around a set of points, whose distance is cheap and smooth."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ import numpy as np
 
 from dikbench.arrays import Array
 
-ROUNDS = 200
-"""Steps towards the centre of the smallest circle (Badoiu & Clarkson): 1/200 of its radius off."""
+CIRCLE_ITERATIONS = 200
+"""Steps of the algorithm of Badoiu & Clarkson, whose centre is then off by 1/200 of the radius."""
 
-HAIR = 1e-9
-"""What is added to a radius [m], so that rounding leaves no point outside."""
+RADIUS_ALLOWANCE_M = 1e-9
+"""Added to the radius, so that rounding leaves no point outside."""
 
 
 def enclosing_capsule(points: Array) -> tuple[Array, Array, float]:
-    """A capsule that contains every point, along that principal axis which makes it smallest.
+    """Compute the smallest capsule along a principal axis that contains every point.
 
     Args:
         points: (n, 3) [m].
@@ -32,7 +32,7 @@ def enclosing_capsule(points: Array) -> tuple[Array, Array, float]:
 
 
 def _along(points: Array, axis: Array) -> tuple[Array, Array, float]:
-    """The capsule about points (n, 3) whose segment is along a unit vector (3,)."""
+    """Compute the capsule about points (n, 3) whose segment is along a unit vector (3,)."""
     height = points @ axis
     flat = points - np.outer(height, axis)
     centre = _circle_centre(flat)
@@ -41,15 +41,15 @@ def _along(points: Array, axis: Array) -> tuple[Array, Array, float]:
     # A point may lie in the cap beyond the segment, as far as its distance from the axis allows.
     cap = np.sqrt(np.maximum(radius**2 - off_axis**2, 0.0))
     low, high = float((height + cap).min()), float((height - cap).max())
-    if low > high:  # one sphere about anything between does
+    if low > high:  # a sphere about any point between them contains all
         low = high = (low + high) / 2
-    return centre + low * axis, centre + high * axis, radius + HAIR
+    return centre + low * axis, centre + high * axis, radius + RADIUS_ALLOWANCE_M
 
 
 def _circle_centre(points: Array) -> Array:
-    """The centre (3,), almost, of the smallest circle about points (n, 3) of a plane."""
+    """Approximate the centre (3,) of the smallest circle about points (n, 3) of a plane."""
     centre: Array = points.mean(axis=0)
-    for number in range(1, ROUNDS):
+    for number in range(1, CIRCLE_ITERATIONS):
         away = points - centre
         farthest = int(np.einsum("ij,ij->i", away, away).argmax())
         centre = centre + away[farthest] / (number + 1)

@@ -13,7 +13,7 @@ from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.robots.robot import checked_vector
 
-UPRIGHT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+IDENTITY_ROTATION = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class SphereObstacle:
         _check_length("SphereObstacle: radius", self.radius)
 
     def geometry(self) -> tuple[Any, Any]:
-        """Its shape (coal) and its placement in the world (`pinocchio.SE3`)."""
+        """Return its shape (coal) and its placement in the world (`pinocchio.SE3`)."""
         return coal.Sphere(self.radius), pin.SE3(np.eye(3), np.array(self.centre))
 
 
@@ -60,7 +60,7 @@ class CapsuleObstacle:
             raise DikbenchError("CapsuleObstacle: start and end are one point; use SphereObstacle")
 
     def geometry(self) -> tuple[Any, Any]:
-        """Its shape (coal) and its placement in the world (`pinocchio.SE3`)."""
+        """Return its shape (coal) and its placement in the world (`pinocchio.SE3`)."""
         return capsule(np.array(self.start), np.array(self.end), self.radius)
 
 
@@ -76,7 +76,7 @@ class BoxObstacle:
 
     centre: tuple[float, float, float]
     size: tuple[float, float, float]
-    rotation: tuple[tuple[float, float, float], ...] = UPRIGHT
+    rotation: tuple[tuple[float, float, float], ...] = IDENTITY_ROTATION
 
     def __post_init__(self) -> None:
         """Check the parameters."""
@@ -90,7 +90,7 @@ class BoxObstacle:
         object.__setattr__(self, "rotation", tuple(map(tuple, R.tolist())))
 
     def geometry(self) -> tuple[Any, Any]:
-        """Its shape (coal) and its placement in the world (`pinocchio.SE3`)."""
+        """Return its shape (coal) and its placement in the world (`pinocchio.SE3`)."""
         return coal.Box(*self.size), pin.SE3(np.array(self.rotation), np.array(self.centre))
 
 
@@ -98,22 +98,22 @@ Obstacle = SphereObstacle | CapsuleObstacle | BoxObstacle
 
 
 def capsule(start: Array, end: Array, radius: float) -> tuple[Any, Any]:
-    """A capsule about a segment (3,) (3,) [m]: its shape (coal), which is along z, and placement.
+    """Build a capsule (coal, along its own z) about a segment (3,), (3,) [m], and its placement.
 
-    A sphere where the segment is a point.
+    It is a sphere where the segment is a point.
     """
-    way = end - start
-    length = float(np.linalg.norm(way))
+    axis = end - start
+    length = float(np.linalg.norm(axis))
     middle = (start + end) / 2
     if length == 0:
         return coal.Sphere(radius), pin.SE3(np.eye(3), middle)
     z = np.array([0.0, 0.0, 1.0])
-    turn = pin.Quaternion.FromTwoVectors(z, way / length).toRotationMatrix()
+    turn = pin.Quaternion.FromTwoVectors(z, axis / length).toRotationMatrix()
     return coal.Capsule(radius, length), pin.SE3(turn, middle)
 
 
 def _keep_point(obstacle: Any, name: str) -> None:
-    """Replace a point by a tuple of floats, whatever it was given as."""
+    """Replace a point by a tuple of floats."""
     what = f"{type(obstacle).__name__}: {name}"
     point = checked_vector(getattr(obstacle, name), 3, what)
     object.__setattr__(obstacle, name, tuple(point.tolist()))

@@ -23,26 +23,25 @@ from dikbench.robots.collision.obstacles import Obstacle
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.robot import Robot
 
-TOLERANCE = 1e-10
-"""Of the iterative distances [m], those of cylinders and boxes: their nearest points are off by the
-root of it (coal's own 1e-6 leaves gradients with errors of 5e-3 m/rad)."""
+DISTANCE_TOLERANCE_M = 1e-10
+"""Tolerance of iterative distances (cylinders, boxes), whose nearest points are off by its square
+root; coal's own 1e-6 leaves errors of 5e-3 m/rad in the gradients."""
 
-AFTER, BEFORE = [1, 2, 0], [2, 0, 1]
-"""Axes of a cross product."""
+NEXT_AXES, PREVIOUS_AXES = [1, 2, 0], [2, 0, 1]
+"""The axes that follow and precede x, y, z in a cross product."""
 
 
 class CollisionPairs:
-    """What of a robot must not touch what.
+    """The pairs of bodies and obstacles of a robot that must not touch.
 
-    Bodies that move against each other are a pair, but those of one joint and the next, those that
-    the robot's SRDF rules out, and those that are nearer than `margin` [m] at the robot's safe
-    start: there the bodies are too coarse to say anything. Every moving body and every obstacle
-    are a pair, without exception.
+    Bodies that move relative to each other are a pair, except those of adjacent joints, those that
+    the robot's SRDF excludes, and those nearer than `margin` [m] at the robot's safe start, where
+    the bodies are too coarse. Every moving body and every obstacle are a pair.
 
     Attributes:
-        names: of the two, pair by pair.
-        joints: that carry them, 0 for the world.
-        left_out: names of the pairs of bodies left out because of the safe start.
+        names: the names of the two, per pair.
+        joints: the joints that carry them, per pair; 0 for the world.
+        left_out: names of the pairs left out because they are near at the safe start.
     """
 
     def __init__(
@@ -73,26 +72,28 @@ class CollisionPairs:
         self._place()
 
     def __len__(self) -> int:
-        """Number of pairs."""
+        """Return the number of pairs."""
         return len(self.names)
 
     def distances(self, kinematics: Kinematics) -> Array:
-        """Signed distances at a configuration, (p,) [m]."""
+        """Compute the signed distances at a configuration, (p,) [m]."""
         kinematics.place_bodies(self._geometry, self._placed)
         pin.computeDistances(self._geometry, self._placed)
         return np.array([result.min_distance for result in self._results])
 
     def gradients(self, kinematics: Kinematics, pairs: Indices) -> Array:
-        """dphi/dq of some pairs, (k, nv) [m/rad or 1], at the configuration of `distances`.
+        """Compute dphi/dq of some pairs, (k, nv) [m/rad or 1], at the last `distances`.
 
         Zero where the nearest points have no direction from each other (axes that cross).
         """
         results = [self._results[pair] for pair in pairs.tolist()]
-        # A unit force along n at the nearest points: they lie on its line, both of them.
+        # A unit force along n through both nearest points.
         wrenches = np.empty((len(results), 6))
         n = wrenches[:, :3] = np.array([result.normal for result in results]).reshape(-1, 3)
         points = np.array([result.getNearestPoint1() for result in results]).reshape(-1, 3)
-        wrenches[:, 3:] = points[:, AFTER] * n[:, BEFORE] - points[:, BEFORE] * n[:, AFTER]
+        wrenches[:, 3:] = (
+            points[:, NEXT_AXES] * n[:, PREVIOUS_AXES] - points[:, PREVIOUS_AXES] * n[:, NEXT_AXES]
+        )
         gradients: Array = (wrenches @ kinematics.spatial_jacobian) * self._signs[pairs]
         return gradients
 
@@ -119,9 +120,9 @@ class CollisionPairs:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)
             for request in self._placed.distanceRequests:
-                request.gjk_tolerance = request.epa_tolerance = TOLERANCE
-                # A guess from the call before makes the last bits depend on it. The name is out of
-                # date, but the new one does not switch it off (coal 3.0).
+                request.gjk_tolerance = request.epa_tolerance = DISTANCE_TOLERANCE_M
+                # A guess from the previous call would change the last bits. The name is deprecated,
+                # but the new one does not switch the guess off (coal 3.0).
                 request.enable_cached_gjk_guess = False
         self._results = list(self._placed.distanceResults)
 
@@ -135,7 +136,7 @@ def _adjacent(model: Any, first: int, second: int) -> bool:
 
 
 def _moved(model: Any) -> Array:
-    """Which velocities move the bodies of each joint: 1 or 0, (njoints, nv)."""
+    """Mark the velocities that move the bodies of each joint: 1 or 0, (njoints, nv)."""
     moved = np.zeros((model.njoints, model.nv))
     for joint in range(1, model.njoints):
         for support in model.supports[joint]:

@@ -1,1 +1,1 @@
-"""What the task frame is to do: references, curves, waypoints, pose files."""
+"""Desired motions of the task frame: references, curves, waypoints, pose files."""

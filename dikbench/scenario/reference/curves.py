@@ -1,4 +1,4 @@
-"""Closed curves in a plane, run round at a constant rate: circle and lemniscate."""
+"""Closed curves in a plane at a constant rate: circle and lemniscate."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from dikbench.arrays import Array
 from dikbench.robots.robot import Robot
 from dikbench.scenario.reference.reference import Reference
 
-UPRIGHT: Final = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+WORLD_YZ_PLANE: Final = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 """The world's y-z plane: its two axes as columns, (3, 2)."""
 
-FLAT: Final = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
-"""The world's x-y plane, that of the planar arms."""
+WORLD_XY_PLANE: Final = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
+"""The world's x-y plane, in which planar arms move, (3, 2)."""
 
 
 def plane_of(robot: Robot) -> Array:
-    """The plane in which a robot's curves lie, (3, 2)."""
-    return UPRIGHT if 2 in robot.task_rows else FLAT
+    """Return the plane in which a robot's curves lie, its two axes as columns (3, 2)."""
+    return WORLD_YZ_PLANE if 2 in robot.task_rows else WORLD_XY_PLANE
 
 
 def circle(
@@ -30,10 +30,10 @@ def circle(
     period: float,
     laps: float,
     *,
-    plane: Array = UPRIGHT,
+    plane: Array = WORLD_YZ_PLANE,
     turn: float = 0.0,
 ) -> Reference:
-    """A circle through `start`, its point with the smallest second coordinate.
+    """Build a circle through `start`, its point with the smallest second coordinate.
 
         p = p_0 + P radius (sin w tau, 1 - cos w tau),   w = 2 pi / period
 
@@ -46,13 +46,9 @@ def circle(
         turn: the frame turns about the normal of the plane by turn sin w tau [rad].
     """
     return _curve(
-        start,
+        (start, period, laps, plane, turn),
         lambda angle: radius * np.array([np.sin(angle), 1 - np.cos(angle)]),
         lambda angle: radius * np.array([np.cos(angle), np.sin(angle)]),
-        period,
-        laps,
-        plane,
-        turn,
     )
 
 
@@ -62,10 +58,10 @@ def lemniscate(
     period: float,
     laps: float,
     *,
-    plane: Array = UPRIGHT,
+    plane: Array = WORLD_YZ_PLANE,
     turn: float = 0.0,
 ) -> Reference:
-    """A figure of eight that crosses itself in `start`.
+    """Build a figure of eight that crosses itself in `start`.
 
         p = p_0 + P size (sin w tau, sin(2 w tau) / 2),   w = 2 pi / period
 
@@ -78,26 +74,19 @@ def lemniscate(
         turn: the frame turns about the normal of the plane by turn sin w tau [rad].
     """
     return _curve(
-        start,
+        (start, period, laps, plane, turn),
         lambda angle: size * np.array([np.sin(angle), np.sin(2 * angle) / 2]),
         lambda angle: size * np.array([np.cos(angle), np.cos(2 * angle)]),
-        period,
-        laps,
-        plane,
-        turn,
     )
 
 
 def _curve(
-    start: Any,
+    given: tuple[Any, float, float, Array, float],
     offset: Callable[[float], Array],
     tangent: Callable[[float], Array],
-    period: float,
-    laps: float,
-    plane: Array,
-    turn: float,
 ) -> Reference:
-    """A curve given by its offset from `start` at an angle, (2,) [m], and the derivative of it."""
+    """Build a curve from its offset from `start` at an angle, (2,) [m], and its derivative."""
+    start, period, laps, plane, turn = given
     first: Array = start.rotation.copy()
     origin = start.translation.copy()
     normal = np.cross(plane[:, 0], plane[:, 1])
@@ -105,7 +94,7 @@ def _curve(
 
     def rotation(angle: float) -> Array:
         if turn == 0:
-            return first  # to the last bit
+            return first  # without rounding
         turned: Array = pin.exp3(turn * np.sin(angle) * normal) @ first
         return turned
 

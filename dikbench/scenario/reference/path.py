@@ -1,4 +1,4 @@
-"""The path of a reference: the curve of its origin, as a chain of straight pieces."""
+"""The path of a reference: the curve of its origin as a chain of straight pieces."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from dikbench.arrays import Array, Indices
 from dikbench.scenario.reference.reference import Reference
 
 CHORD_ERROR_M: Final = 1e-6
-"""About how far a straight piece may be from the curve that it stands for."""
+"""Approximate largest distance of a straight piece from the curve."""
 
 LONGEST_PIECE_M: Final = 5e-3
-"""Pieces are joined up to this length, where the path is straight enough."""
+"""Largest length up to which pieces are joined where the path is straight enough."""
 
 MAX_SAMPLES_PER_PERIOD: Final = 16
 """A control period is divided into at most this many samples."""
 
 NEGLIGIBLE_LENGTH_M: Final = 1e-9
-"""A path, or a step along it, that is shorter than this is a point."""
+"""A shorter path, or step along it, counts as a point."""
 
 FIRST_NEIGHBOUR_COUNT: Final = 3
-"""This many of the nearest vertices are searched to begin with."""
+"""Number of nearest vertices that are searched first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,8 +34,7 @@ class ReferencePath:
 
     Attributes:
         vertices: ends of the straight pieces, (k + 1, 3) [m].
-        once: number of the first pieces that hold the path as a set; those of a periodic one repeat
-            them.
+        once: number of pieces of the path as a set; a periodic path repeats these.
     """
 
     vertices: Array
@@ -43,7 +42,7 @@ class ReferencePath:
 
     @property
     def is_point(self) -> bool:
-        """Whether the origin of the reference stays where it is."""
+        """Whether the origin of the reference does not move."""
         return len(self.vertices) == 1
 
     @cached_property
@@ -74,7 +73,7 @@ class ReferencePath:
             nearest[unsettled] = np.sqrt(np.min(squares, axis=(0, 2)))
             if count == tree.n:
                 break
-            # The pieces not searched yet end in vertices that are farther away than these.
+            # The remaining pieces end in vertices that are farther away than these.
             floor = np.sqrt(np.maximum(there[:, -1] ** 2 - half**2, 0.0))
             unsettled = unsettled[nearest[unsettled] > floor + CHORD_ERROR_M]
             count *= 4
@@ -107,7 +106,7 @@ class ReferencePath:
 def reference_path(reference: Reference, end: float, dt: float) -> ReferencePath:
     """Compute the path of a moving reference up to a nominal time [s], sampled at dt [s] or finer.
 
-    Pieces are as long as they can be: within `CHORD_ERROR_M` of the samples, or `LONGEST_PIECE_M`.
+    Pieces are as long as `CHORD_ERROR_M` and `LONGEST_PIECE_M` allow.
     """
     times, points = _samples(reference, end, dt)
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)

@@ -13,10 +13,10 @@ import pinocchio as pin
 
 from dikbench.errors import DikbenchError
 
-COLUMNS: Final = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
+POSE_COLUMNS: Final = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
 
-ROUNDED: Final = 1e-3
-"""A quaternion's norm may be off by this much, as it is where its digits were cut."""
+QUATERNION_NORM_TOLERANCE: Final = 1e-3
+"""Largest error of a quaternion's norm, which comes from rounded digits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,9 +24,9 @@ class PoseFile:
     """Placements at increasing times.
 
     Attributes:
-        times: from 0 on [s].
+        times: times from 0 on [s].
         placements: one per time (`pinocchio.SE3`).
-        lines: the line of the file that each stands in.
+        lines: the line of the file of each.
     """
 
     times: tuple[float, ...]
@@ -37,12 +37,12 @@ class PoseFile:
 def read_poses(path: str) -> PoseFile:
     """Read a CSV file with the columns t [s], x, y, z [m], qx, qy, qz, qw (unit quaternion).
 
-    Columns may stand in any order, others are not read. Times count from the first row's.
+    Columns may be in any order, others are ignored. Times count from the first row.
 
     Raises:
-        DikbenchError: if the file is missing, a column or a value is, a value is not a finite
-            number, times do not increase, a quaternion is not of unit norm, or there are fewer than
-            two rows.
+        DikbenchError: if the file, a column or a value is missing, a value is not a finite number,
+            times do not increase, a quaternion is not of unit norm, or there are fewer than two
+            rows.
     """
     if not os.path.isfile(path):
         raise DikbenchError(f"pose file not found: {path}")
@@ -52,14 +52,15 @@ def read_poses(path: str) -> PoseFile:
     try:
         with open(path, encoding="utf-8-sig", newline="") as file:
             rows = csv.DictReader(file, skipinitialspace=True)
-            missing = [name for name in COLUMNS if name not in (rows.fieldnames or ())]
+            missing = [name for name in POSE_COLUMNS if name not in (rows.fieldnames or ())]
             if missing:
+                expected = ",".join(POSE_COLUMNS)
                 raise DikbenchError(
-                    f"pose file {path}: no column {missing[0]!r}; expected: {','.join(COLUMNS)}"
+                    f"pose file {path}: no column {missing[0]!r}; expected: {expected}"
                 )
             for row in rows:
                 where = f"pose file {path}, line {rows.line_num}"
-                t, *pose = (_number(row[name], name, where) for name in COLUMNS)
+                t, *pose = (_number(row[name], name, where) for name in POSE_COLUMNS)
                 if times and t <= times[-1]:
                     raise DikbenchError(f"{where}: t={t:g} must be above {times[-1]:g} before it")
                 times.append(t)
@@ -85,6 +86,6 @@ def _number(text: str | None, name: str, where: str) -> float:
 def _placement(pose: list[float], where: str) -> Any:
     quaternion = np.array(pose[3:])
     norm = float(np.linalg.norm(quaternion))
-    if abs(norm - 1) > ROUNDED:
+    if abs(norm - 1) > QUATERNION_NORM_TOLERANCE:
         raise DikbenchError(f"{where}: the quaternion's norm is {norm:.4g}, it must be 1")
     return pin.SE3(pin.Quaternion(quaternion / norm).matrix(), np.array(pose[:3]))

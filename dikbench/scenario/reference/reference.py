@@ -1,4 +1,4 @@
-"""Reference motions: where the task frame should be at every nominal instant."""
+"""Reference motions: the desired placement of the task frame at every nominal time."""
 
 from __future__ import annotations
 
@@ -22,13 +22,12 @@ class Reference:
     A time-indexed run has tau = t; in a path-indexed one tau waits for the robot.
 
     Attributes:
-        duration: nominal time from end to end [s]; a target at rest has no path and is held as
-            long as the scenario lasts.
+        duration: nominal time from end to end [s]; a target at rest has no path and is held until
+            the end of the scenario.
         placement: tau -> placement X_d in the world (`pinocchio.SE3`).
         velocity: tau -> body twist V_d at nominal speed, (6,) [m/s; rad/s], in the axes of X_d.
         moving: whether there is a path at all.
-        period: nominal time of a lap, after which everything comes again [s]; infinite where
-            nothing does.
+        period: nominal time of a lap, after which the motion repeats [s]; infinite if it does not.
         first_lap: nominal time at which the first lap begins [s].
     """
 
@@ -41,13 +40,13 @@ class Reference:
 
 
 def target_at_rest(target: Any, duration: float) -> Reference:
-    """A placement that is wanted from the first instant on (a step)."""
+    """Build a reference that rests at a placement from the first instant on (a step)."""
     zero = np.zeros(6)
     return Reference(duration, lambda tau: target, lambda tau: zero, moving=False)
 
 
 def screw_path(middle: Any, twist: Array, duration: float) -> Reference:
-    """A constant body twist (6,) through `middle`, which it passes at half the duration.
+    """Build a constant body twist (6,) that passes `middle` at half the duration.
 
     X_d(tau) = middle exp6((tau - duration/2) twist).
     """
@@ -64,7 +63,7 @@ def joint_path(
     velocity: Callable[[float], Array],
     duration: float,
 ) -> Reference:
-    """The motion of the task frame along a joint motion: tau -> q (nq,), tau -> dq/dtau (nv,)."""
+    """Build the task frame's motion along a joint motion tau -> q (nq,), tau -> dq/dtau (nv,)."""
     kinematics = Kinematics(robot)
 
     def placement(tau: float) -> Any:

@@ -1,4 +1,4 @@
-"""A path through placements at given times, along a screw from each to the next."""
+"""A path through placements at given times, along screw motions."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ def through(times: Sequence[float], placements: Sequence[Any], *, smooth: bool) 
     Args:
         times: increasing, from 0 on, at least two [s].
         placements: one per time (`pinocchio.SE3`).
-        smooth: whether each segment begins and ends at rest, in the way of least jerk (Flash &
-            Hogan 1985), or keeps its speed, which then jumps from one segment to the next.
+        smooth: whether each segment begins and ends at rest with least jerk (Flash & Hogan 1985),
+            or has a constant speed, which then jumps between segments.
     """
     twists = [pin.log6(here.actInv(there)).np for here, there in pairwise(placements)]
     spans = np.diff(times)

@@ -1,1 +1,1 @@
-"""The solvers that there are, and their settings."""
+"""The known solvers and their settings."""

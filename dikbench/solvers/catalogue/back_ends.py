@@ -1,4 +1,4 @@
-"""The solvers that are known by name: what each can solve, and which settings it takes."""
+"""The solvers known by name: what each can solve, and which settings it takes."""
 
 from __future__ import annotations
 
@@ -6,18 +6,16 @@ import importlib.util
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final, Literal
 
 import msgspec
 
 from dikbench.errors import DikbenchError, unknown
 from dikbench.programs.quadratic_program import ProgramKind
 from dikbench.selector import Selector, parse_selector
-from dikbench.solvers.catalogue.presets import TOLERANCES, Preset, preset_settings
+from dikbench.solvers.catalogue.presets import TOLERANCES, preset_settings
 
 Interface = Literal["cold", "warm", "cvxpy"]
-INTERFACES: Final = get_args(Interface)
-PRESETS: Final = get_args(Preset)
 
 
 @dataclass(frozen=True)
@@ -26,23 +24,21 @@ class BackEnd:
 
     Attributes:
         summary: one line for `dikbench list solvers`.
-        package: the import name of the library.
-        distribution: its name on the package index, whose version stands in the manifest.
+        package: the name of the library, for importing and installing it.
         programs: what it can solve when called with matrices.
         interfaces: how it can be called, the default first.
         settings: the settings that it takes, with their types.
-        no_lp: why it cannot solve linear programs, where it cannot.
-        ours: settings that are ours where the user names none, and not the library's.
+        no_lp: why it cannot solve linear programs; empty where it can.
+        own_defaults: settings with a default of dikbench instead of the library's.
     """
 
     summary: str
     package: str
-    distribution: str
     programs: frozenset[ProgramKind]
     interfaces: tuple[Interface, ...]
     settings: Mapping[str, type]
     no_lp: str = ""
-    ours: Mapping[str, Any] = field(default_factory=dict)
+    own_defaults: Mapping[str, Any] = field(default_factory=dict)
 
 
 _QP_ONLY: Final[frozenset[ProgramKind]] = frozenset({"qp"})
@@ -53,14 +49,12 @@ BACK_ENDS: Mapping[str, BackEnd] = MappingProxyType(
         "osqp": BackEnd(
             "operator splitting; Stellato et al. 2020",
             "osqp",
-            "osqp",
             _QP_AND_LP,
             ("cold", "warm", "cvxpy"),
             {"eps_abs": float, "eps_rel": float, "max_iter": int, "polishing": bool},
         ),
         "clarabel": BackEnd(
             "interior point, homogeneous embedding; Goulart & Chen 2024",
-            "clarabel",
             "clarabel",
             _QP_AND_LP,
             ("cold", "warm", "cvxpy"),
@@ -69,14 +63,12 @@ BACK_ENDS: Mapping[str, BackEnd] = MappingProxyType(
         "piqp": BackEnd(
             "proximal interior point; Schwan et al. 2023",
             "piqp",
-            "piqp",
             _QP_AND_LP,
             ("cold", "warm"),
             {"eps_abs": float, "eps_rel": float, "max_iter": int},
         ),
         "proxqp": BackEnd(
             "proximal augmented Lagrangian; Bambade et al. 2022",
-            "proxsuite",
             "proxsuite",
             _QP_ONLY,
             ("cold", "warm"),
@@ -86,14 +78,12 @@ BACK_ENDS: Mapping[str, BackEnd] = MappingProxyType(
         "daqp": BackEnd(
             "dual active set; Arnstrom, Bemporad & Axehill 2022",
             "daqp",
-            "daqp",
             _QP_AND_LP,
             ("cold", "warm"),
             {"primal_tol": float, "dual_tol": float, "iter_limit": int},
         ),
         "highs": BackEnd(
             "simplex for linear, active set for quadratic programs; Huangfu & Hall 2018",
-            "highspy",
             "highspy",
             _QP_AND_LP,
             ("cold", "warm", "cvxpy"),
@@ -102,12 +92,11 @@ BACK_ENDS: Mapping[str, BackEnd] = MappingProxyType(
                 "dual_feasibility_tolerance": float,
                 "qp_iteration_limit": int,
             },
-            # Its active-set method cycles without end on some semidefinite programs of our size.
-            ours=MappingProxyType({"qp_iteration_limit": 1000}),
+            # Its active-set method cycles endlessly on some semidefinite programs of this size.
+            own_defaults=MappingProxyType({"qp_iteration_limit": 1000}),
         ),
         "quadprog": BackEnd(
             "dual active set (GPL, an optional extra); Goldfarb & Idnani 1983",
-            "quadprog",
             "quadprog",
             _QP_ONLY,
             ("cold",),
@@ -116,7 +105,6 @@ BACK_ENDS: Mapping[str, BackEnd] = MappingProxyType(
         ),
         "scs": BackEnd(
             "operator splitting for cones; O'Donoghue et al. 2016",
-            "scs",
             "scs",
             _QP_AND_LP,
             ("cvxpy",),
@@ -128,14 +116,14 @@ BACK_ENDS: Mapping[str, BackEnd] = MappingProxyType(
 DEFAULT_SOLVER: Final[Mapping[ProgramKind, str]] = MappingProxyType(
     {"qp": "daqp", "lp": "daqp", "cvxpy": "clarabel"}
 )
-"""The solver that a law gets where none is named."""
+"""The solver of a formulation where none is named."""
 
 
 @dataclass(frozen=True)
 class Solver:
     """A back end, how it is called, and its settings (those not named are the library's).
 
-    `tolerance` is the largest residual of a verified answer, as its preset says.
+    `tolerance` is the largest residual of a verified answer under its preset.
     """
 
     name: str
@@ -145,14 +133,14 @@ class Solver:
 
 
 def is_installed(name: str) -> bool:
-    """Whether the back end of this name can be imported here."""
+    """Say whether the back end of this name can be imported here."""
     return importlib.util.find_spec(BACK_ENDS[name].package) is not None
 
 
 def parse_solver(text: str | Selector) -> Solver:
     """Read a selector such as `osqp`, `osqp[preset=high]` or `clarabel[interface=warm]`.
 
-    A setting that is named beside a preset goes before the preset's.
+    A setting that is named in addition to a preset replaces the preset's.
 
     Raises:
         DikbenchError: on an unknown solver, interface, preset or setting, a value of the wrong
@@ -164,17 +152,17 @@ def parse_solver(text: str | Selector) -> Solver:
     back_end = BACK_ENDS[selector.name]
     if not is_installed(selector.name):
         raise DikbenchError(
-            f"solver {selector.name!r} is not installed: pip install {back_end.distribution}"
+            f"solver {selector.name!r} is not installed: pip install {back_end.package}"
         )
     parameters = dict(selector.parameters)
     interface = parameters.pop("interface", back_end.interfaces[0])
     if interface not in back_end.interfaces:
         raise unknown(f"interface of solver {selector.name}", interface, back_end.interfaces)
     preset: Any = parameters.pop("preset", "default")
-    if preset not in PRESETS:
-        raise unknown(f"preset of solver {selector.name}", preset, PRESETS)
+    if preset not in TOLERANCES:
+        raise unknown(f"preset of solver {selector.name}", preset, TOLERANCES)
     settings = {
-        **back_end.ours,
+        **back_end.own_defaults,
         **preset_settings(selector.name, preset),
         **_settings(back_end, selector, parameters),
     }
@@ -182,11 +170,11 @@ def parse_solver(text: str | Selector) -> Solver:
 
 
 def why_not(solver: Solver, program: ProgramKind) -> str:
-    """Why this solver cannot take this kind of program; empty where it can."""
+    """Say why this solver cannot take this kind of program; empty where it can."""
     back_end = BACK_ENDS[solver.name]
     if program == "cvxpy":
         if solver.interface == "warm":
-            return f"{solver.name}[interface=warm] takes matrices, and the law is written in cvxpy"
+            return f"{solver.name}[interface=warm] takes matrices, not a formulation in cvxpy"
         if "cvxpy" in back_end.interfaces:
             return ""
         valid = ", ".join(n for n, b in BACK_ENDS.items() if "cvxpy" in b.interfaces)

@@ -1,4 +1,4 @@
-"""Presets: one verified tolerance, said to each solver in its own words."""
+"""Presets: one verified tolerance, expressed in the settings of each solver."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ TOLERANCES: Final[Mapping[Preset, float]] = MappingProxyType(
     {"default": 1e-3, "low": 1e-3, "mid": 1e-6, "high": 1e-8}
 )
 """The largest residual of a verified answer under each preset: primal in rad/s and m/s, dual and
-gap as scaled (see `Residuals`). `default` leaves the library its own settings."""
+gap as scaled (see `Residuals`). `default` keeps the library's own settings."""
 
-MARGIN: Final = 0.1
-"""Share of the tolerance that a solver is asked for: it measures in its own scaling."""
+REQUESTED_TOLERANCE_SHARE: Final = 0.1
+"""Share of the tolerance that is set in a solver, which measures residuals in its own scaling."""
 
-FINEST: Final = 1e-10
-"""The smallest tolerance that HiGHS takes."""
+HIGHS_SMALLEST_TOLERANCE: Final = 1e-10
+"""The smallest tolerance that HiGHS accepts."""
 
 _SETTINGS: Final[Mapping[str, Callable[[float], Mapping[str, Any]]]] = MappingProxyType(
     {
@@ -38,8 +38,8 @@ _SETTINGS: Final[Mapping[str, Callable[[float], Mapping[str, Any]]]] = MappingPr
             "eps_duality_gap_rel": 0.0,
             "max_iter": 10_000,
         },
-        # Exact but where it smooths a linear program: more strongly (a negative weight is one where
-        # needed) and to a finer end than by default.
+        # It is exact except where it smooths a linear program, here more strongly (a negative
+        # weight applies only where needed) and to a smaller residual than by default.
         "daqp": lambda eps: {
             "primal_tol": eps / 10,
             "dual_tol": 1e-12,
@@ -47,8 +47,8 @@ _SETTINGS: Final[Mapping[str, Callable[[float], Mapping[str, Any]]]] = MappingPr
             "eta_prox": eps / 10,
         },
         "highs": lambda eps: {
-            "primal_feasibility_tolerance": max(eps, FINEST),
-            "dual_feasibility_tolerance": max(eps, FINEST),
+            "primal_feasibility_tolerance": max(eps, HIGHS_SMALLEST_TOLERANCE),
+            "dual_feasibility_tolerance": max(eps, HIGHS_SMALLEST_TOLERANCE),
             "qp_regularization_value": 0.0,
         },
         "quadprog": lambda eps: {},  # exact, and without settings
@@ -58,7 +58,7 @@ _SETTINGS: Final[Mapping[str, Callable[[float], Mapping[str, Any]]]] = MappingPr
 
 
 def preset_settings(solver: str, preset: Preset) -> Mapping[str, Any]:
-    """The settings of a solver under a preset."""
+    """Return the settings of a solver under a preset."""
     if preset == "default":
         return {}
-    return _SETTINGS[solver](MARGIN * TOLERANCES[preset])
+    return _SETTINGS[solver](REQUESTED_TOLERANCE_SHARE * TOLERANCES[preset])

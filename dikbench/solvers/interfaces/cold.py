@@ -16,32 +16,34 @@ from dikbench.programs.answer import Answer
 from dikbench.programs.quadratic_program import QuadraticProgram
 from dikbench.solvers.catalogue.back_ends import Solver
 
-SPARSE: Final = frozenset({"osqp", "clarabel", "highs"})
-"""Back ends that take sparse matrices; handing them over dense costs a warning and a conversion."""
+SPARSE_BACK_ENDS: Final = frozenset({"osqp", "clarabel", "highs"})
+"""Back ends that take sparse matrices; dense ones would cost a warning and a conversion."""
 
-UNSAID: Final[Mapping[str, Mapping[str, Any]]] = MappingProxyType({"osqp": {"raise_error": False}})
-"""What we say to a back end so that its default, today the same, may change (OSQP warns of it)."""
+PINNED_DEFAULTS: Final[Mapping[str, Mapping[str, Any]]] = MappingProxyType(
+    {"osqp": {"raise_error": False}}
+)
+"""Settings equal to today's defaults, named since the default will change (OSQP warns of it)."""
 
-# A failure is in the answer; a warning beside each would drown the run.
+# The answer tells a failure; a warning about each would fill the output.
 warnings.filterwarnings("ignore", module=r"qpsolvers\.")
 
 
 class ColdSolver:
-    """A back end called afresh for every program, whatever its call site."""
+    """A back end called from scratch for every program."""
 
     __slots__ = ("_name", "_settings", "_sparse")
 
     def __init__(self, solver: Solver) -> None:
         self._name = solver.name
-        self._settings = {**UNSAID.get(solver.name, {}), **solver.settings}
-        self._sparse = solver.name in SPARSE
+        self._settings = {**PINNED_DEFAULTS.get(solver.name, {}), **solver.settings}
+        self._sparse = solver.name in SPARSE_BACK_ENDS
 
     def __call__(self, program: QuadraticProgram, site: int = 0) -> Answer:
-        """Solve a program; a failure of any kind is an answer that claims nothing."""
+        """Solve a program; any failure gives an answer that is not claimed."""
         G, h = program.G, program.h
         if self._name == "highs" and G is None and program.A is None:
-            # HiGHS 1.15 calls wrong points optimal where bounds are all there is; a row that
-            # constrains nothing makes it right.
+            # HiGHS 1.15 calls wrong points optimal where there are bounds only; a row that
+            # constrains nothing avoids it.
             G, h = np.zeros((1, len(program.q))), np.ones(1)
         problem = qpsolvers.Problem(
             self._matrix(program.P),
@@ -55,7 +57,7 @@ class ColdSolver:
         )
         try:
             solution = qpsolvers.solve_problem(problem, solver=self._name, **self._settings)
-        except Exception:  # each library has its own (OSQP's is not among those of qpsolvers)
+        except Exception:  # each library raises its own (qpsolvers does not wrap OSQP's)
             return Answer(None, claimed=False)
         x = solution.x
         claimed = bool(solution.found) and x is not None and bool(np.isfinite(x).all())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from dataclasses import dataclass
 from functools import lru_cache
@@ -17,8 +18,8 @@ from dikbench.programs.modelled_program import ModelledProgram
 from dikbench.programs.quadratic_program import QuadraticProgram
 from dikbench.solvers.catalogue.back_ends import Solver
 
-# What a solver thinks of its own accuracy is rechecked; a warning beside each would drown the run.
-warnings.filterwarnings("ignore", module=r"cvxpy\.|dikbench\.solvers\.modelled")
+# Answers are rechecked; a warning about the accuracy of each would fill the output.
+warnings.filterwarnings("ignore", module=rf"cvxpy\.|{re.escape(__name__)}")
 
 
 class ModelledSolver:
@@ -27,16 +28,16 @@ class ModelledSolver:
     __slots__ = ("_options",)
 
     def __init__(self, solver: Solver) -> None:
-        # cvxpy would start from the answer before, which may be of another trial of this process.
+        # cvxpy would start from the previous answer, perhaps of another trial of this process.
         options = {"solver": solver.name.upper(), "warm_start": False}
         self._options: dict[str, Any] = {**options, **solver.settings}
 
     def __call__(self, program: QuadraticProgram | ModelledProgram, site: int = 0) -> Answer:
-        """Solve a program; a failure of any kind is an answer that claims nothing."""
+        """Solve a program; any failure gives an answer that is not claimed."""
         if isinstance(program, ModelledProgram):
             model, unknowns = program.model, program.unknowns
         else:
-            model, unknowns = _in_modelling_words(program)
+            model, unknowns = _modelled(program)
         try:
             model.solve(**self._options)
         except (cvxpy.error.SolverError, ValueError, ArithmeticError):
@@ -53,7 +54,7 @@ class ModelledSolver:
 
 @dataclass(frozen=True)
 class _Shape:
-    """What a compiled problem depends on: sizes, and which bounds are finite."""
+    """What a compiled problem depends on: sizes, and the indices of finite bounds."""
 
     unknowns: int
     equalities: int
@@ -63,8 +64,8 @@ class _Shape:
     upper: tuple[int, ...]
 
 
-def _in_modelling_words(program: QuadraticProgram) -> tuple[Any, tuple[Any, ...]]:
-    """The compiled problem of this program's shape, its parameters set to this program's values."""
+def _modelled(program: QuadraticProgram) -> tuple[Any, tuple[Any, ...]]:
+    """Return the compiled problem of this program's shape with this program's values."""
     shape = _Shape(
         len(program.q),
         0 if program.b is None else len(program.b),
@@ -90,7 +91,7 @@ def _in_modelling_words(program: QuadraticProgram) -> tuple[Any, tuple[Any, ...]
 
 
 def _finite(bound: Array | None) -> tuple[int, ...]:
-    """Indices of the finite entries of a bound."""
+    """Return the indices of the finite entries of a bound."""
     return () if bound is None else tuple(int(i) for i in np.flatnonzero(np.isfinite(bound)))
 
 
@@ -120,7 +121,7 @@ def _compiled(shape: _Shape) -> tuple[Any, Any, dict[str, Any]]:
 
 
 def _root(P: Array) -> Array:
-    """R with R^T R = P for a positive semidefinite P (n, n)."""
+    """Compute R with R^T R = P for a positive semidefinite P (n, n)."""
     values, vectors = scipy.linalg.eigh(P)
     root: Array = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
     return root

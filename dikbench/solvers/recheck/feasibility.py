@@ -1,4 +1,4 @@
-"""Whether a program has any feasible point: the judge between a hard program and a bad solver."""
+"""Whether a program has a feasible point: an infeasible program or a failed solver?"""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ LINPROG_INFEASIBLE: Final = 2
 
 
 def is_feasible(program: QuadraticProgram) -> bool:
-    """Whether the simplex method does not refute it (HiGHS, feasibility tolerance 1e-7)."""
+    """Say whether HiGHS' simplex method finds no contradiction (feasibility tolerance 1e-7)."""
     n = len(program.q)
     lower = np.full(n, -np.inf) if program.lb is None else program.lb
     upper = np.full(n, np.inf) if program.ub is None else program.ub

@@ -1,4 +1,4 @@
-"""How far answers are from the optimum, which residuals cannot say near a singularity."""
+"""Distances of answers from the optimum, which residuals do not bound near a singularity."""
 
 from __future__ import annotations
 
@@ -15,24 +15,23 @@ from dikbench.solvers.interfaces.cold import ColdSolver
 from dikbench.solvers.recheck.residuals import residuals
 from dikbench.solvers.recheck.stack import Stack
 
-JUDGE: Final = Solver("daqp", "cold", {})
-"""An active-set method: where it answers it answers to rounding, and its own answer is checked."""
+JUDGE_SOLVER: Final = Solver("daqp", "cold", {})
+"""An active-set method, whose answers are exact up to rounding; they are checked as well."""
 
-EXACT: Final = 1e-6
-"""Residuals up to which the judge's own answer is taken for the optimum of a strictly convex
-program."""
+JUDGE_RESIDUAL_CONVEX: Final = 1e-6
+"""Largest residual of a judge's answer that counts as the optimum of a strictly convex program."""
 
-EXACT_COST: Final = 1e-4
-"""The same for other programs, of which only the cost is compared: the judge smooths them."""
+JUDGE_RESIDUAL: Final = 1e-4
+"""The same for other programs, of which the cost is compared; the judge smooths them."""
 
-PROVEN: Final = 1e-4
-"""A distance up to which the residuals themselves are proof enough, and no judge is asked."""
+PROVEN_DISTANCE: Final = 1e-4
+"""Up to this bound on the distance, which follows from the residuals, no judge is needed."""
 
 
 def distance_to_optimum(
     programs: Sequence[QuadraticProgram], answers: Sequence[Answer], nearness: Array
 ) -> Array:
-    """Distance of each answer's x from the optimum.
+    """Compute the distance of each answer's x from the optimum.
 
     Where P is positive definite the optimum x* is unique and this is max |x - x*| [rad/s]: near a
     singularity the cost is so flat that small residuals allow wrong velocities. Elsewhere it is the
@@ -41,14 +40,14 @@ def distance_to_optimum(
     Args:
         programs: k of them.
         answers: to them, all with an x.
-        nearness: a bound on the distance (see `Residuals`), (k,); where it is small it is taken for
-            the distance, elsewhere a solver of our own choice is asked.
+        nearness: a bound on the distance (see `Residuals`), (k,); where it is small it is taken as
+            the distance, elsewhere the judge solves the program.
 
     Returns:
-        The distances, (k,); NaN where the judge has no answer to trust.
+        The distances, (k,); NaN where the judge's answer does not pass its own check.
     """
-    distance = np.where(nearness <= PROVEN, nearness, np.nan)
-    judge = ColdSolver(JUDGE)
+    distance = np.where(nearness <= PROVEN_DISTANCE, nearness, np.nan)
+    judge = ColdSolver(JUDGE_SOLVER)
     for k in np.flatnonzero(np.isnan(distance)).tolist():
         program, x = programs[k], answers[k].x
         assert x is not None
@@ -58,9 +57,9 @@ def distance_to_optimum(
         found = residuals(Stack([program], [judged]))
         worst = float(max(found.primal[0], found.dual[0], found.gap[0]))
         if _is_positive_definite(program.P):
-            if worst <= EXACT:
+            if worst <= JUDGE_RESIDUAL_CONVEX:
                 distance[k] = np.abs(x - judged.x).max()
-        elif worst <= EXACT_COST:
+        elif worst <= JUDGE_RESIDUAL:
             cost, best = (0.5 * p @ program.P @ p + program.q @ p for p in (x, judged.x))
             distance[k] = abs(cost - best)
     return distance

@@ -1,4 +1,4 @@
-"""What the recheck of a run's answers found, step by step."""
+"""The results of rechecking a run's answers, per control step."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from dikbench.solvers.recheck.optimum import distance_to_optimum
 from dikbench.solvers.recheck.residuals import residuals
 from dikbench.solvers.recheck.stack import Stack, structure
 
-VERIFIED_DISTANCE: Final = 1e-2
-"""The largest distance from the optimum of a verified answer [rad/s; alpha for alpha scaling]."""
+LARGEST_VERIFIED_DISTANCE: Final = 1e-2
+"""Largest distance of a verified answer from the optimum [rad/s; alpha for alpha scaling]."""
 
 NO_PROGRAM: Final = -1
-"""Stands for `claimed` and `verified` of a step at which nothing was solved."""
+"""The value of `claimed` and `verified` at a step at which nothing was solved."""
 
 Solved = tuple[int, QuadraticProgram | ModelledProgram, Answer]
-"""The step, what was solved at it, and the answer."""
+"""Number of the step, the program, and the answer."""
 
 _Answered = tuple[int, QuadraticProgram, Answer]
 
 
 class RecheckedSteps:
-    """What the recheck found at each of n control steps, (n,) each.
+    """The results of the recheck at each of n control steps, (n,) each.
 
     Attributes:
-        claimed: 1 if the solver said of every program that it solved it, 0 if not, -1 if there was
+        claimed: 1 if the solver claimed to have solved every program, 0 if not, -1 if there was
             none.
         lied: whether the solver claimed an answer that is not within tolerance.
         verified: 1 if every answer is within tolerance, 0 if not, -1 if there was none.
@@ -53,10 +53,10 @@ class RecheckedSteps:
         self.distance: Array = np.zeros(steps)
 
     def recheck(self, solved: Sequence[Solved], tolerance: float) -> None:
-        """Recheck answers and record what is found at their steps.
+        """Recheck answers and record the results at their steps.
 
         Args:
-            solved: what was solved, at steps of which none was rechecked before.
+            solved: programs and answers of steps that were not rechecked before.
             tolerance: largest residual of a verified answer.
         """
         if not solved:
@@ -79,14 +79,14 @@ class RecheckedSteps:
     def _recheck_group(self, group: list[_Answered], tolerance: float) -> None:
         steps, programs, answers = (list(column) for column in zip(*group, strict=True))
         stack = Stack(programs, answers)
-        with np.errstate(invalid="ignore", over="ignore"):  # an answer may be anything
+        with np.errstate(invalid="ignore", over="ignore"):  # an answer may not be finite
             found = residuals(stack)
             distance = distance_to_optimum(programs, answers, found.nearness)
             np.maximum.at(self.primal, steps, found.primal)
-            np.maximum.at(self.dual, steps, found.dual)  # what is not known stays NaN
+            np.maximum.at(self.dual, steps, found.dual)  # NaN where unknown
             np.maximum.at(self.gap, steps, found.gap)
             np.maximum.at(self.distance, steps, distance)
         good = np.isfinite(stack.x).all(axis=1) & found.within(tolerance)
-        good &= ~(distance > VERIFIED_DISTANCE)
+        good &= ~(distance > LARGEST_VERIFIED_DISTANCE)
         np.minimum.at(self.verified, steps, good.astype(int))
         np.logical_or.at(self.lied, steps, ~good & [answer.claimed for answer in answers])

@@ -1,4 +1,4 @@
-"""How far answers are from solving their programs, recomputed by us."""
+"""Residuals of answers, recomputed from their programs."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ import numpy as np
 from dikbench.arrays import Array, Mask
 from dikbench.solvers.recheck.stack import Stack
 
-SAMPLED: Final = 16
-"""One in so many matrices tells how flat the costs of a run are."""
+EIGENVALUE_SAMPLE_STRIDE: Final = 16
+"""The smallest eigenvalue is guessed from one matrix in this many."""
 
 
 class Residuals:
     """Residuals of k answers, (k,) each.
 
     Attributes:
-        primal: largest violation of an equality, inequality or bound [rad/s, m/s].
+        primal: largest violation of an equality, inequality or bound [rad/s or m/s].
         dual: largest entry of P x + q + G^T z + A^T y + z_box, and largest multiplier of the wrong
             sign, over max(1, largest entry of P), a gradient of the cost; NaN where the interface
             gives no multipliers.
@@ -25,7 +25,7 @@ class Residuals:
         nearness: a bound on the distance from the optimum that follows from them to first order
             (see `optimum`): max |x - x*| [rad/s] where P is positive definite, the difference in
             cost elsewhere; infinite where nothing follows.
-        explained: whether there are multipliers, so that dual and gap are known.
+        explained: whether there are multipliers, from which dual and gap follow.
     """
 
     __slots__ = ("dual", "explained", "gap", "nearness", "primal")
@@ -40,7 +40,7 @@ class Residuals:
         self.nearness = nearness
 
     def within(self, tolerance: float) -> Mask:
-        """Whether every residual that can be known is within a tolerance, (k,); NaN is not."""
+        """Say whether every residual that is known is within a tolerance, (k,); NaN is not."""
         good: Mask = self.primal <= tolerance
         if self.explained:
             good = good & (self.dual <= tolerance) & (self.gap <= tolerance)
@@ -50,7 +50,7 @@ class Residuals:
 def residuals(stack: Stack) -> Residuals:
     """Recompute the residuals of answers.
 
-    A bound that is infinite constrains nothing and carries no multiplier.
+    An infinite bound constrains nothing; a multiplier of it counts as one of the wrong sign.
     """
     primal = _primal(stack)
     if not stack.explained:
@@ -59,17 +59,17 @@ def residuals(stack: Stack) -> Residuals:
     Px = np.einsum("kij,kj->ki", stack.P, stack.x)
     gradient = Px + stack.q
     gap = _dots(stack.x, gradient)
-    wrong_sign = pushing = np.zeros(len(stack.x))
+    wrong_sign = multiplier_sum = np.zeros(len(stack.x))
     if stack.A is not None and stack.b is not None and stack.y is not None:
         gradient = gradient + np.einsum("kij,ki->kj", stack.A, stack.y)
         gap = gap + _dots(stack.b, stack.y)
-        pushing = pushing + np.abs(stack.y).sum(axis=1)
-    for bound, push in _one_sided(stack):
-        gap = gap + _dots(np.where(np.isfinite(bound), bound, 0.0), push)
-        # Nothing can push at a bound that is not there.
-        vain = np.where(np.isfinite(bound), 0.0, np.abs(push)).max(axis=1, initial=0.0)
-        wrong_sign = np.maximum(wrong_sign, vain)
-        pushing = pushing + np.abs(push).sum(axis=1)
+        multiplier_sum = multiplier_sum + np.abs(stack.y).sum(axis=1)
+    for bound, multiplier in _one_sided(stack):
+        gap = gap + _dots(np.where(np.isfinite(bound), bound, 0.0), multiplier)
+        # An infinite bound cannot have a multiplier.
+        invalid = np.where(np.isfinite(bound), 0.0, np.abs(multiplier)).max(axis=1, initial=0.0)
+        wrong_sign = np.maximum(wrong_sign, invalid)
+        multiplier_sum = multiplier_sum + np.abs(multiplier).sum(axis=1)
     if stack.z_box is not None:
         gradient = gradient + stack.z_box
     if stack.G is not None and stack.z is not None:
@@ -77,13 +77,13 @@ def residuals(stack: Stack) -> Residuals:
         wrong_sign = np.maximum(wrong_sign, (-stack.z).max(axis=1, initial=0.0))
     scale = np.maximum(1.0, np.abs(stack.P).max(axis=(1, 2)))
     dual = np.maximum(np.abs(gradient).max(axis=1), wrong_sign)
-    slack = np.abs(gap - _dots(stack.x, gradient)) + 2 * primal * pushing
+    slack = np.abs(gap - _dots(stack.x, gradient)) + 2 * primal * multiplier_sum
     nearness = np.where(wrong_sign > 0, np.inf, _nearness(stack, gradient, slack))
     return Residuals(primal, dual / scale, np.abs(gap) / scale, nearness, explained=True)
 
 
 def _one_sided(stack: Stack) -> list[tuple[Array, Array]]:
-    """The inequalities and bounds with their multipliers, (k, .) each."""
+    """Pair the inequalities and bounds with their multipliers, (k, .) each."""
     pairs = []
     if stack.h is not None and stack.z is not None:
         pairs.append((stack.h, stack.z))
@@ -98,10 +98,10 @@ def _one_sided(stack: Stack) -> list[tuple[Array, Array]]:
 def _nearness(stack: Stack, gradient: Array, slack: Array) -> Array:
     """Bound the distance from the optimum, (k,).
 
-    With r the gradient that is left over and s the slack (both as they are, not scaled):
+    With r the residual gradient and s the slack, both unscaled:
 
     P positive definite:  mu |x - x*|^2 <= |x - x*| |r| + s,   mu its smallest eigenvalue
-    elsewhere:            cost - cost* <= |r|_1 max |x - x*| + s
+    otherwise:            cost - cost* <= |r|_1 max |x - x*| + s
     """
     definite = np.all(np.diagonal(stack.P, axis1=1, axis2=2) > 0, axis=1)
     bound = np.full(len(stack.x), np.inf)
@@ -121,13 +121,13 @@ def _nearness(stack: Stack, gradient: Array, slack: Array) -> Array:
 
 
 def _softness(P: Array) -> Array:
-    """1/mu for each of P (k, n, n), with mu not above its smallest eigenvalue; infinity elsewhere.
+    """Compute 1/mu for P (k, n, n), mu a lower bound on the eigenvalues; infinite if indefinite.
 
-    One mu for all is guessed from a few and proved by a factorisation of P - mu I, which is faster
-    than an inverse of each.
+    One mu for all is guessed from a few matrices and proved by a factorisation of P - mu I, which
+    is faster than an inverse of each matrix.
     """
     try:
-        mu = 0.5 / np.linalg.norm(np.linalg.inv(P[::SAMPLED]), axis=(1, 2)).max()
+        mu = 0.5 / np.linalg.norm(np.linalg.inv(P[::EIGENVALUE_SAMPLE_STRIDE]), axis=(1, 2)).max()
         np.linalg.cholesky(P - mu * np.eye(P.shape[1]))
         return np.full(len(P), 1 / mu)
     except np.linalg.LinAlgError:
@@ -136,7 +136,7 @@ def _softness(P: Array) -> Array:
         np.linalg.cholesky(P)
         inverses: Array = np.linalg.norm(np.linalg.inv(P), axis=(1, 2))
         return inverses
-    except np.linalg.LinAlgError:  # one of them is not definite; the judge looks at each
+    except np.linalg.LinAlgError:  # one is not definite; the judge solves each program
         return np.full(len(P), np.inf)
 
 

@@ -1,10 +1,8 @@
-"""Programs of one structure and the answers to them, stacked: what is rechecked at once."""
+"""Programs of one structure and their answers, stacked to be rechecked together."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import repeat
-from operator import attrgetter, is_
 
 import numpy as np
 
@@ -49,15 +47,11 @@ class Stack:
 
 
 def _stacked(owners: Sequence[QuadraticProgram] | Sequence[Answer], part: str) -> Array:
-    parts = [*map(attrgetter(part), owners)]
-    if all(map(is_, parts, repeat(parts[0]))):  # such as bounds away from every limit
-        shared = np.asarray(parts[0])
-        return np.broadcast_to(shared, (len(parts), *shared.shape))
-    return np.array(parts)
+    return np.array([getattr(owner, part) for owner in owners])
 
 
 def structure(program: QuadraticProgram, answer: Answer) -> tuple[object, ...]:
-    """What programs and answers must have in common to be stacked."""
+    """Return what programs and answers must have in common to be stacked."""
     A, G = program.A, program.G
     return (
         len(program.q),

@@ -255,7 +255,8 @@ class Mink:
 
 def main() -> None:
     """Ask everyone and write the file."""
-    random, kept = np.random.default_rng(7), {}
+    random = np.random.default_rng(7)
+    kept: dict[str, Any] = {}
     for name in URDFS:
         robot = load_robot(name)
         q, v, V = states(robot, random)

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import signal
@@ -7,6 +8,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -66,48 +68,97 @@ def test_help_does_not_import_anything_heavy() -> None:
     assert "run" in done.stdout
 
 
-@pytest.mark.parametrize(
-    ("arguments", "expected"),
-    [
-        (("run", "nosuch"), ("nosuch", "quick")),
-        (("run", "--formulation", "dls[damping=many]"), ("damping", "float")),
-        (("run", "--formulation", "dls[dampin=1]"), ("dampin", "valid: damping")),
-        (("run", "--formulation", "nofile.py:Formulation"), ("nofile.py",)),
-        (("run", "--solver", "osqp[eps=1]"), ("eps", "eps_abs")),
-        (("run", "--scenario", "reach[robot=bad.urdf,frame=tip]"), ("bad.urdf", "URDF")),
-        (("run", "--scenario", "near-miss[robot=talos,singularity=wrist]"), ("wrist", "elbow")),
-        (("run", "--scenario", "reach[gain=1||2]"), ("gain", "empty")),
-        (("run", "--plant", "ideal[delay=-1]"), ("delay=-1", "0 to")),
-        (("run", "train", "--seed", "0"), ("seed 0", "1 to 99")),
-        (("show", "near-miss", "--figure", "a.gif"), ("a.gif", ".svg, .png, .pdf")),
-        (("show", "near-miss", "--figure", "no/such/a.png"), ("no/such/a.png", "No such file")),
-        (("show", "dls", "--figure", "a.png"), ("dls", "near-miss")),
-        (("run", "--scenario", "reach[duration=1e15]"), ("steps", "valid")),
-        (("run", "--plant", "perfect"), ("perfect", "ideal")),
-        (("run", "--reference", "space"), ("space", "path")),
-        (("run", "--seed", "-1"), ("-1",)),
-        (("run", "--out", "afile/inside", "--formulation", "dls"), ("afile/inside",)),
-        (("recompute", "nowhere"), ("no results", "nowhere")),
-        (("list", "formulations"), ("formulations", "formulations")),
-        (("show", "nothing"), ("nothing", "valid")),
-        (("--plnt",), ("--plnt",)),
-    ],
-)
-def test_malformed_input_is_one_line_and_exit_code_two(
-    tmp_path: Path, arguments: tuple[str, ...], expected: tuple[str, ...]
-) -> None:
+MALFORMED = [
+    (("run", "nosuch"), ("nosuch", "quick")),
+    (("run", "--formulation", "dls[damping=many]"), ("damping", "float")),
+    (("run", "--formulation", "dls[dampin=1]"), ("dampin", "valid: damping")),
+    (("run", "--formulation", "nofile.py:Formulation"), ("nofile.py",)),
+    (("run", "--solver", "osqp[eps=1]"), ("eps", "eps_abs")),
+    (("run", "--scenario", "reach[robot=bad.urdf,frame=tip]"), ("bad.urdf", "URDF")),
+    (("run", "--scenario", "near-miss[robot=talos,singularity=wrist]"), ("wrist", "elbow")),
+    (("run", "--scenario", "reach[gain=1||2]"), ("gain", "empty")),
+    (("run", "--plant", "ideal[delay=-1]"), ("delay=-1", "0 to")),
+    (("run", "train", "--seed", "0"), ("seed 0", "1 to 99")),
+    (("show", "near-miss", "--figure", "a.gif"), ("a.gif", ".svg, .png, .pdf")),
+    (("show", "near-miss", "--figure", "no/such/a.png"), ("no/such/a.png", "No such file")),
+    (("show", "dls", "--figure", "a.png"), ("dls", "near-miss")),
+    (("run", "--scenario", "reach[duration=1e15]"), ("steps", "valid")),
+    (("run", "--plant", "perfect"), ("perfect", "ideal")),
+    (("run", "--reference", "space"), ("space", "path")),
+    (("run", "--seed", "-1"), ("-1",)),
+    (("run", "--out", "afile/inside", "--formulation", "dls"), ("afile/inside",)),
+    (("recompute", "nowhere"), ("no results", "nowhere")),
+    (("list", "laws"), ("laws", "formulations")),
+    (("show", "nothing"), ("nothing", "valid")),
+    (("--plnt",), ("--plnt",)),
+]
+SHOWN = {
+    "qp": "min_v",
+    "near-miss[miss=0.05]": "required speed over limit",
+    "near-miss": "miss = 0.02: 0 or 0.001 to 0.2 [m; rad]  (instances: 0.002 to 0.05, logarithmic)",
+    "dls": "damping = 0.05: finite and at least 0  (tuned: 0.001 to 0.3, logarithmic)",
+    "osqp": "eps_abs",
+    "panda": "panda_hand_tcp",
+    "direction_error_max_rad": "unit: rad",
+    "quick": "[[cells]]",
+}
+
+ONE_AFTER_THE_OTHER = """
+import json, os, sys, traceback
+from pathlib import Path
+from dikbench.cli import main
+
+streams, folder = (os.dup(1), os.dup(2)), Path.cwd()
+for number, arguments in enumerate(json.loads(sys.argv[1])):
+    os.chdir(folder / str(number) / "cwd")
+    for stream, name in ((1, "stdout"), (2, "stderr")):
+        os.dup2(os.open(f"../{name}", os.O_WRONLY | os.O_CREAT), stream)
+    sys.argv, code = ["dikbench", *arguments], None
+    try:
+        main()
+    except SystemExit as left:
+        code = left.code
+    except BaseException:
+        traceback.print_exc()
+    sys.stdout.flush()
+    Path("../code").write_text(json.dumps(code))
+for stream, kept in enumerate(streams, start=1):
+    os.dup2(kept, stream)
+"""
+"""Runs many commands in one process, each in a folder of its own: most of the time of a command
+that ends in an error is taken by imports."""
+
+
+def run_all(folder: Path, commands: Sequence[Sequence[str]]) -> list[Path]:
+    """Run commands; of each a folder with `stdout`, `stderr`, `code`, and `cwd`, where it ran."""
+    folders = [folder / str(number) for number in range(len(commands))]
+    for each in folders:
+        (each / "cwd").mkdir(parents=True)
+        (each / "cwd" / "bad.urdf").write_text("<robot name='x'>")
+        (each / "cwd" / "afile").touch()
+    command = [sys.executable, "-c", ONE_AFTER_THE_OTHER, json.dumps(commands)]
+    subprocess.run(command, cwd=folder, check=True, timeout=600)
+    return folders
+
+
+@pytest.fixture(scope="module")
+def refused(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """What came of the malformed commands, in their order."""
+    return run_all(tmp_path_factory.mktemp("refused"), [arguments for arguments, _ in MALFORMED])
+
+
+@pytest.mark.parametrize("number", range(len(MALFORMED)), ids=lambda n: " ".join(MALFORMED[n][0]))
+def test_malformed_input_is_one_line_and_exit_code_two(refused: list[Path], number: int) -> None:
     """Whatever is wrong with a command: one line, exit code 2, no traceback, nothing written."""
-    (tmp_path / "bad.urdf").write_text("<robot name='x'>")
-    (tmp_path / "afile").touch()
-    before = sorted(tmp_path.rglob("*"))
-    done = dikbench(*arguments, cwd=tmp_path)
-    assert done.returncode == 2, done.stderr
-    assert done.stdout == ""
-    assert len(done.stderr.strip().splitlines()) == 1, done.stderr
-    assert done.stderr.startswith("error: ")
+    folder, (_, expected) = refused[number], MALFORMED[number]
+    said = (folder / "stderr").read_text()
+    assert (folder / "code").read_text() == "2", said
+    assert (folder / "stdout").read_text() == ""
+    assert len(said.strip().splitlines()) == 1, said
+    assert said.startswith("error: ")
     for part in expected:
-        assert part in done.stderr
-    assert sorted(tmp_path.rglob("*")) == before
+        assert part in said
+    assert sorted(path.name for path in (folder / "cwd").rglob("*")) == ["afile", "bad.urdf"]
 
 
 def test_a_failed_command_touches_no_earlier_results(tmp_path: Path) -> None:
@@ -164,22 +215,36 @@ def test_a_law_in_a_file_runs_without_packaging(tmp_path: Path) -> None:
     assert by_formulation["my_law.py:MyLaw[gain=2]"] > by_formulation["my_law.py:MyLaw"]
 
 
-@pytest.mark.parametrize(
-    ("name", "expected"),
-    [
-        ("qp", "min_v"),
-        ("near-miss[miss=0.05]", "required speed over limit"),
-        ("osqp", "eps_abs"),
-        ("panda", "panda_hand_tcp"),
-        ("direction_error_max_rad", "unit: rad"),
-        ("quick", "[[cells]]"),
-    ],
-)
-def test_show_prints_one_thing_in_full(tmp_path: Path, name: str, expected: str) -> None:
-    """`dikbench show` knows formulations, scenarios, solvers, robots, metrics and studies."""
-    done = dikbench("show", name, cwd=tmp_path)
+def test_a_family_in_a_file_runs_without_packaging(tmp_path: Path) -> None:
+    """`path/to/file.py:Class` as a scenario: shown, run in the workers, reported."""
+    (tmp_path / "my_reach.py").write_text(
+        "from dataclasses import dataclass\n"
+        "from scenarios.reach import Reach\n"
+        "@dataclass(frozen=True, kw_only=True)\n"
+        "class Short(Reach):\n"
+        '    """A short reach."""\n'
+        "    distance: float = 0.05\n"
+        "    duration: float = 0.5\n"
+    )
+    shown = dikbench("show", "my_reach.py:Short", cwd=tmp_path)
+    assert shown.returncode == 0, shown.stderr
+    assert "distance = 0.05: 0.01 to 0.3 [m]" in shown.stdout
+    done = dikbench(
+        "run", "--formulation", "dls", "--scenario", "my_reach.py:Short[distance=0.02|0.1]",
+        "--plant", "ideal", "--out", "out", cwd=tmp_path,
+    )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert expected in done.stdout
+    trials = pd.read_csv(tmp_path / "out" / "trials.csv")
+    assert list(trials["status"]) == ["ok", "ok"]
+    assert "A short reach" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_show_prints_one_thing_in_full(tmp_path: Path) -> None:
+    """`dikbench show` knows formulations, scenarios, solvers, robots, metrics and studies."""
+    folders = run_all(tmp_path, [("show", name) for name in SHOWN])
+    for folder, expected in zip(folders, SHOWN.values(), strict=True):
+        assert (folder / "code").read_text() in {"0", "null"}, (folder / "stderr").read_text()
+        assert expected in (folder / "stdout").read_text()
 
 
 SHORT = ("--formulation", "dls", "--scenario", "reach[duration=0.2]", "--plant", "ideal")
@@ -265,6 +330,7 @@ from dataclasses import dataclass
 @dataclass(frozen=True)
 class Spin:
     def velocity(self, problem, solve):
+        open("spinning", "w").close()
         while True:
             pass
 """
@@ -282,11 +348,15 @@ def test_no_worker_outlives_its_driver(tmp_path: Path, how: signal.Signals) -> N
         stdout=subprocess.DEVNULL,
         cwd=tmp_path,
     )
-    time.sleep(8)
-    assert len(_processes_in(tmp_path)) >= 2
+    for _ in range(1200):
+        if (tmp_path / "spinning").exists() or process.poll() is not None:
+            break
+        time.sleep(0.1)
+    at_work = _processes_in(tmp_path)
     process.send_signal(how)
-    process.wait(timeout=30)
-    for _ in range(100):
+    process.wait(timeout=60)
+    assert len(at_work) >= 2
+    for _ in range(300):
         if not _processes_in(tmp_path):
             break
         time.sleep(0.1)
@@ -305,28 +375,26 @@ def _processes_in(folder: Path) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("ending", ["svg", "png", "pdf"])
-def test_a_scenario_is_shown_with_its_certificate_and_its_picture(
-    tmp_path: Path, ending: str
-) -> None:
+def test_a_scenario_is_shown_with_its_certificate_and_its_picture(tmp_path: Path) -> None:
     """The claims, what the motion asks for, what a seed perturbs; and a figure of its kind."""
-    name = f"picture.{ending}"
-    done = dikbench("show", "near-miss[robot=panda,miss=0.01]", "--figure", name, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    for part in (
-        "Certificate of near-miss[robot=panda,miss=0.01]:",
-        "smallest singular value (m, rad): ",
-        "margin to the position limits [rad]: ",
-        "required speed over limit: up to ",
-        "reach from the first joint [m]: ",
-        "A seed perturbs: start by up to 0.1 rad per joint, timing by up to 10 %.",
-        name,
-    ):
-        assert part in done.stdout
-    content = (tmp_path / name).read_bytes()
     begins = {"svg": b"<?xml", "png": bytes.fromhex("89504e470d0a1a0a"), "pdf": b"%PDF"}
-    assert content.startswith(begins[ending])
-    assert len(content) > 5000
+    shown = ("show", "near-miss[robot=panda,miss=0.01]", "--figure")
+    folders = run_all(tmp_path, [(*shown, f"picture.{ending}") for ending in begins])
+    for folder, (ending, head) in zip(folders, begins.items(), strict=True):
+        assert (folder / "code").read_text() in {"0", "null"}, (folder / "stderr").read_text()
+        for part in (
+            "Certificate of near-miss[robot=panda,miss=0.01]:",
+            "smallest singular value (m, rad): ",
+            "margin to the position limits [rad]: ",
+            "required speed over limit: up to ",
+            "reach from the first joint [m]: ",
+            "A seed perturbs: start by up to 0.1 rad per joint, timing by up to 10 %.",
+            f"picture.{ending}",
+        ):
+            assert part in (folder / "stdout").read_text()
+        content = (folder / "cwd" / f"picture.{ending}").read_bytes()
+        assert content.startswith(head)
+        assert len(content) > 5000
 
 
 def test_every_listed_scenario_says_what_it_provokes_and_which_metric_shows_it() -> None:

@@ -74,7 +74,7 @@ def of(
 ) -> Motion:
     """The motion of a frame that is at place(t) at the trace time t; 0.01 s per step."""
     n = round(reference.duration / DT)
-    t = DT * np.arange(n + 1)
+    t = DT * np.arange(n + 1.0)
     mode: ReferenceMode = "time" if tau is None else "path"
     tau = t if tau is None else tau
     translations = np.array([place(time) for time in t])
@@ -249,7 +249,7 @@ def test_a_dwell_is_no_delay() -> None:
 
 def test_a_target_that_waits_is_late_itself() -> None:
     """A path-indexed run that makes half the way per step does not come to the end in time."""
-    tau = 0.5 * DT * np.arange(201)
+    tau = 0.5 * DT * np.arange(201.0)
     motion = of(straight(), lambda t: np.array([0.15 * t, 0.0, 0.0]), tau)
     got = evaluate(motion)
     assert got["position_error_max_m"] == pytest.approx(0.0, abs=1e-12)
@@ -331,9 +331,11 @@ def least_distance(reference: Reference, point: Array) -> float:
     best = instants[np.argsort([away(tau) for tau in instants.tolist()])[:8]]
     step = instants[1]
     return min(
-        minimize_scalar(
-            away, bounds=(tau - step, tau + step), method="bounded", options={"xatol": 1e-9}
-        ).fun
+        float(
+            minimize_scalar(
+                away, bounds=(tau - step, tau + step), method="bounded", options={"xatol": 1e-9}
+            ).fun
+        )
         for tau in np.clip(best, step, reference.duration - step).tolist()
     )
 

@@ -18,7 +18,7 @@ from dikbench.plugins.building import make_scenario
 from dikbench.problem.tasks import OrientationTask, PositionTask
 from dikbench.scenario import Scenario
 from dikbench.scenario.reference.reference import target_at_rest
-from dikbench.simulation.closed_loop import DIVERGED_SPEED
+from dikbench.simulation.closed_loop import DIVERGED_SPEED_RAD_S
 from dikbench.simulation.status import STEP_STATUSES
 from dikbench.simulation.trace import Trace
 
@@ -102,7 +102,7 @@ def check(found: dict[str, float]) -> None:
 @given(
     name=st.sampled_from(NAMES),
     steps=st.sampled_from([0, 1, 2, 3, 4, 7, 30, 90]),
-    speed=st.sampled_from([0.0, 1e-12, 1e-3, 1.0, 30.0, DIVERGED_SPEED]),
+    speed=st.sampled_from([0.0, 1e-12, 1e-3, 1.0, 30.0, DIVERGED_SPEED_RAD_S]),
     seed=st.integers(0, 2**32 - 1),
     waits=st.booleans(),
 )

@@ -10,7 +10,6 @@ import pinocchio as pin
 import pytest
 
 from dikbench import SphereObstacle
-from dikbench.arrays import Array
 from dikbench.metrics import METRICS, motion_of
 from dikbench.metrics.distance_and_torque import CONSTRAINTS
 from dikbench.problem.constraints import CollisionConstraint, Constraint, TorqueConstraint
@@ -37,7 +36,20 @@ def values(robot: Robot, speeds: list[float], *constraints: Constraint) -> dict[
     none, nothing = np.zeros(n, dtype=int), np.zeros(n)
     wanted = np.zeros((n, len(robot.task_rows)))
     trace = Trace(
-        DT, q, DT * np.arange(n + 1), wanted, v, v, none, none, none, none, *[nothing] * 4
+        DT,
+        q,
+        DT * np.arange(n + 1.0),
+        wanted,
+        v,
+        v,
+        none,
+        none,
+        none,
+        none,
+        nothing,
+        nothing,
+        nothing,
+        nothing,
     )
     scenario = Scenario(
         robot=robot,
@@ -67,9 +79,8 @@ def pendulum(effort: object) -> Robot:
 
 def sphere(x: float, y: float) -> CollisionConstraint:
     """A sphere of 0.06 m in the plane of an arm, to be kept 0.05 m away from."""
-    centre: Array = np.array([x, y, 0.0])
     return CollisionConstraint(
-        [SphereObstacle(centre, 0.06)], self_collision=False, margin=0.05, influence=0.5
+        [SphereObstacle((x, y, 0.0), 0.06)], self_collision=False, margin=0.05, influence=0.5
     )
 
 

@@ -62,7 +62,7 @@ def _trace(speeds: list[float], wanted: list[list[float]], statuses: list[Status
     return Trace(
         dt=0.1,
         q=q,
-        tau=0.1 * np.arange(n + 1),
+        tau=0.1 * np.arange(n + 1.0),
         wanted=np.array(wanted).reshape(n, 3),
         commanded=applied + 100.0,  # nothing may be read off the command
         applied=applied,

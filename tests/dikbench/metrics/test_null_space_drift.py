@@ -29,7 +29,7 @@ def drift(scenario: Scenario, v: Array, tau: Array | None = None) -> float:
     for velocity in v:
         q.append(pin.integrate(scenario.robot.model, q[-1], velocity * dt))
     nothing, none = np.zeros(n), np.zeros(n, dtype=int)
-    times = dt * np.arange(n + 1) if tau is None else tau
+    times = dt * np.arange(n + 1.0) if tau is None else tau
     trace = Trace(
         dt, np.array(q), times, v, v, v, none, none, none, none, nothing, nothing, nothing, nothing
     )
@@ -57,7 +57,7 @@ def test_in_a_path_indexed_run_the_phase_is_that_of_the_path() -> None:
     period, n = SWEEP.reference.period, 2 * SWEEP.steps
     v = np.zeros((n, 7))
     v[:, 0] = 5e-3
-    tau = 0.5 * SWEEP.dt * np.arange(n + 1)
+    tau = 0.5 * SWEEP.dt * np.arange(n + 1.0)
     assert drift(SWEEP, v, tau) == pytest.approx(2 * 5e-3 * period, rel=1e-6)
 
 

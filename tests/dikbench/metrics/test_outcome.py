@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import pairwise
@@ -50,7 +51,7 @@ class Share:
         return share * make_formulation(self.law).velocity(problem, solve)
 
 
-LAWS = {
+LAWS: dict[str, Callable[[], Share]] = {
     "idle": lambda: Share("pinv", 0.0, 0.0),
     "reckless": lambda: Share("pinv"),
     "scaled": lambda: Share("pinv[after=scale]"),

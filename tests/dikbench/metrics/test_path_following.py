@@ -138,7 +138,7 @@ def test_chatter_is_back_and_forth_beyond_the_acceleration_limit(
     still = motion(scenario, Idle()).trace
     nothing, none = np.zeros(n), np.zeros(n, dtype=int)
     trace = replace(
-        still, q=np.array(q), tau=dt * np.arange(n + 1), wanted=np.zeros((n, 6)), commanded=v,
+        still, q=np.array(q), tau=dt * np.arange(n + 1.0), wanted=np.zeros((n, 6)), commanded=v,
         applied=v, status=none, relaxed=none, claimed=none, verified=none, primal=nothing,
         dual=nothing, gap=nothing, distance=nothing,
     )  # fmt: skip

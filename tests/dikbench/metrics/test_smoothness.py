@@ -29,7 +29,7 @@ def of(name: str, v: Array, dt: float, start: float = 0.0) -> float:
         applied[:] = v
     n, nothing, none = len(v), np.zeros(len(v)), np.zeros(len(v), dtype=int)
     trace = Trace(
-        dt, np.zeros((n + 1, 3)), dt * np.arange(n + 1), applied, applied, applied, none, none,
+        dt, np.zeros((n + 1, 3)), dt * np.arange(n + 1.0), applied, applied, applied, none, none,
         none, none, nothing, nothing, nothing, nothing,
     )  # fmt: skip
     scenario = Scenario(

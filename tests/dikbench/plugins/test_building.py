@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from makers.plugins import law_with
+from makers.scenarios import error_of
 
-from dikbench.errors import DikbenchError
 from dikbench.plugins.building import (
     make_family,
     make_formulation,
@@ -63,13 +63,6 @@ def law_file(tmp_path: Path) -> Path:
     return path
 
 
-def _message(call: Callable[..., object], *args: object) -> str:
-    with pytest.raises(DikbenchError) as caught:
-        call(*args)
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
-
-
 # --- names, parameters and their types
 
 
@@ -113,7 +106,7 @@ def test_parameters_arrive_in_their_types() -> None:
 )
 def test_wrong_formulations_name_what_would_be_valid(text: str, parts: list[str]) -> None:
     """One line: what was wrong, where, and the nearest match or the choices."""
-    message = _message(make_formulation, text)
+    message = error_of(make_formulation, text)
     for part in parts:
         assert part in message
 
@@ -132,14 +125,14 @@ def test_wrong_formulations_name_what_would_be_valid(text: str, parts: list[str]
 )
 def test_wrong_scenarios_name_what_would_be_valid(text: str, parts: list[str]) -> None:
     """One line: what was wrong, where, and the nearest match or the choices."""
-    message = _message(make_scenario, text)
+    message = error_of(make_scenario, text)
     for part in parts:
         assert part in message
 
 
 def test_the_seed_is_not_offered_as_a_parameter() -> None:
     """It comes from the study, so that it is no suggestion for a typing error either."""
-    assert "seed" not in _message(make_scenario, "reach[sead=3]").partition("valid:")[2]
+    assert "seed" not in error_of(make_scenario, "reach[sead=3]").partition("valid:")[2]
 
 
 # --- a law in a file
@@ -173,7 +166,7 @@ def test_a_law_from_a_file(law_file: Path) -> None:
 def test_errors_of_a_law_in_a_file(law_file: Path, selector: str, parts: list[str]) -> None:
     """The file is named, and what there is in it."""
     values = {"file": law_file, "folder": law_file.parent, "long": "x" * 300}
-    message = _message(make_formulation, selector.format(**values))
+    message = error_of(make_formulation, selector.format(**values))
     for part in parts:
         assert part.format(**values) in message
 
@@ -190,28 +183,13 @@ def test_a_file_that_cannot_be_imported_is_named(tmp_path: Path, text: str, reas
     """With the reason that Python gives, and no traceback."""
     path = tmp_path / "broken.py"
     path.write_text(text)
-    message = _message(make_formulation, f"{path}:Law")
+    message = error_of(make_formulation, f"{path}:Law")
     assert message.startswith(f"formulation file {path} cannot be imported: {reason}")
-
-
-def _law_with(tmp_path: Path, fields: str, imports: str = "") -> str:
-    path = tmp_path / "law.py"
-    path.write_text(
-        "from __future__ import annotations\n"
-        "from dataclasses import dataclass\n"
-        f"{imports}\n"
-        "@dataclass(frozen=True)\n"
-        "class Law:\n"
-        f"    {fields}\n"
-        "    def velocity(self, problem, solve):\n"
-        "        return None\n"
-    )
-    return f"{path}:Law"
 
 
 def test_a_parameter_keeps_its_type_where_another_cannot_be_resolved(tmp_path: Path) -> None:
     """A name imported for type checkers only must not turn every number into a text."""
-    selector = _law_with(
+    selector = law_with(
         tmp_path,
         "gain: float = 1.0\n    careful: bool = False\n    target: Array | None = None",
         "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n from dikbench.arrays import Array",
@@ -219,7 +197,7 @@ def test_a_parameter_keeps_its_type_where_another_cannot_be_resolved(tmp_path: P
     law: Any = make_formulation(f"{selector}[gain=0.5,careful=true]")
     assert law.gain == 0.5
     assert law.careful is True
-    message = _message(make_formulation, f"{selector}[gain=much]")
+    message = error_of(make_formulation, f"{selector}[gain=much]")
     assert "gain='much' is not valid" in message
 
 
@@ -235,43 +213,43 @@ def test_an_inherited_parameter_keeps_the_type_of_its_base(tmp_path: Path) -> No
     )
     law: Any = make_formulation(f"{path}:Slower[after=clip,rank_tolerance=0.25,factor=0.1]")
     assert (law.after, law.rank_tolerance, law.factor) == ("clip", 0.25, 0.1)
-    message = _message(make_formulation, f"{path}:Slower[after=cilp]")
+    message = error_of(make_formulation, f"{path}:Slower[after=cilp]")
     assert "valid: none, clip, scale" in message
 
 
 def test_a_parameter_that_no_text_can_give_is_an_error(tmp_path: Path) -> None:
     """An array or a function has no form in a selector."""
-    selector = _law_with(
+    selector = law_with(
         tmp_path, "weight: float | Array = 1.0", "from dikbench.arrays import Array"
     )
-    assert "weight='2' is not valid" in _message(make_formulation, f"{selector}[weight=2]")
+    assert "weight='2' is not valid" in error_of(make_formulation, f"{selector}[weight=2]")
     assert make_formulation(selector) is not None
 
 
 def test_a_required_parameter_must_be_given(tmp_path: Path) -> None:
     """The message names it; given, it arrives."""
-    selector = _law_with(tmp_path, "gain: float")
-    assert "parameter 'gain' must be given" in _message(make_formulation, selector)
+    selector = law_with(tmp_path, "gain: float")
+    assert "parameter 'gain' must be given" in error_of(make_formulation, selector)
     law: Any = make_formulation(f"{selector}[gain=2]")
     assert law.gain == 2.0
 
 
 def test_a_law_that_refuses_its_parameters_is_an_error_of_one_line(tmp_path: Path) -> None:
     """Whatever it raises: the message names the law and carries the reason."""
-    selector = _law_with(
+    selector = law_with(
         tmp_path,
         "gain: float = 1.0\n"
         "    def __post_init__(self):\n"
         "        if self.gain < 0: raise ValueError('gain must not be negative')",
     )
-    message = _message(make_formulation, f"{selector}[gain=-1]")
+    message = error_of(make_formulation, f"{selector}[gain=-1]")
     assert "Law" in message
     assert "gain must not be negative" in message
 
 
 def test_ranges_of_a_law_without_a_base_are_checked(tmp_path: Path) -> None:
     """A plain frozen dataclass may have ranges in its annotations; a selector is held to them."""
-    selector = _law_with(
+    selector = law_with(
         tmp_path,
         "gain: Annotated[float, Range(0.0, 2.0, '1/s')] = 1.0",
         "from typing import Annotated\nfrom dikbench.problem import Range",
@@ -279,15 +257,15 @@ def test_ranges_of_a_law_without_a_base_are_checked(tmp_path: Path) -> None:
     law: Any = make_formulation(f"{selector}[gain=2]")
     assert law.gain == 2.0
     for value in ("3", "nan", "-1"):
-        message = _message(make_formulation, f"{selector}[gain={value}]")
+        message = error_of(make_formulation, f"{selector}[gain={value}]")
         assert message == f"formulation Law: gain={float(value)} must be 0 to 2 [1/s]"
 
 
 def test_a_parameter_with_one_value_is_not_offered() -> None:
     """A family that fixes its frame says so where one is given, and lists it nowhere."""
     assert make_scenario("greedy-trap[robot=planar1r]").robot.name == "planar1r"
-    assert "frame='tool0' is not valid" in _message(make_scenario, "step[frame=tool0]")
-    assert "frame" not in _message(make_scenario, "step[frme=tool0]").partition("valid:")[2]
+    assert "frame='tool0' is not valid" in error_of(make_scenario, "step[frame=tool0]")
+    assert "frame" not in error_of(make_scenario, "step[frme=tool0]").partition("valid:")[2]
 
 
 def test_the_values_of_a_selector_s_parameters() -> None:

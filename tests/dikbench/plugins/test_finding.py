@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import importlib.metadata
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
 import pytest
+from makers.plugins import law_with
+from makers.scenarios import error_of
 
-from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_formulation, make_scenario
 from dikbench.plugins.finding import plugins, scenario_plugin
+from dikbench.scenario import Family, Perturbation, Robot
 from formulations.damped_least_squares import DampedLeastSquares
 from formulations.pseudo_inverse import PseudoInverse
 from scenarios.reach import Reach
@@ -28,6 +32,10 @@ class _EntryPoint:
         self.load = load
 
 
+def _same(module: ModuleType) -> ModuleType:
+    return module
+
+
 Install = Callable[..., None]
 
 
@@ -39,14 +47,14 @@ def install(monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
         points = []
         for name, entry in entries.items():
             if isinstance(entry, ModuleType):
-                points.append(_EntryPoint(name, lambda module=entry: module))
+                points.append(_EntryPoint(name, partial(_same, entry)))
             elif callable(entry):
                 points.append(_EntryPoint(name, entry))
             else:
                 module = ModuleType(name)
                 module.__file__ = f"/somewhere/{name}.py"
                 setattr(module, group.removeprefix("dikbench.").upper(), entry)
-                points.append(_EntryPoint(name, lambda module=module: module))
+                points.append(_EntryPoint(name, partial(_same, module)))
         known = {group: points}
         monkeypatch.setattr(
             importlib.metadata, "entry_points", lambda *, group: known.get(group, [])
@@ -60,28 +68,6 @@ def install(monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
 
 def _laws(**table: Any) -> Mapping[str, Any]:
     return {name.replace("_", "-"): build for name, build in table.items()}
-
-
-def _message(call: Callable[..., object], *args: object) -> str:
-    with pytest.raises(DikbenchError) as caught:
-        call(*args)
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
-
-
-def _law_with(tmp_path: Path, fields: str, imports: str = "") -> str:
-    path = tmp_path / "law.py"
-    path.write_text(
-        "from __future__ import annotations\n"
-        "from dataclasses import dataclass\n"
-        f"{imports}\n"
-        "@dataclass(frozen=True)\n"
-        "class Law:\n"
-        f"    {fields}\n"
-        "    def velocity(self, problem, solve):\n"
-        "        return None\n"
-    )
-    return f"{path}:Law"
 
 
 # --- tables of other projects
@@ -100,14 +86,14 @@ def test_a_table_may_hold_a_law_with_its_parameters_set(install: Install) -> Non
     assert make_formulation("soft") == DampedLeastSquares(0.2)
     assert make_formulation("soft[damping=0.3]") == DampedLeastSquares(0.3)
     assert plugins("formulation")["soft"].parameters["damping"].default == 0.2
-    assert "did you mean 'damping'?" in _message(make_formulation, "soft[dampin=1]")
+    assert "did you mean 'damping'?" in error_of(make_formulation, "soft[dampin=1]")
 
 
 def test_the_parameters_that_an_instance_has_need_not_be_given(
     install: Install, tmp_path: Path
 ) -> None:
     """Also where the class itself has no default for them."""
-    law: Any = make_formulation(_law_with(tmp_path, "gain: float") + "[gain=2]")
+    law: Any = make_formulation(law_with(tmp_path, "gain: float") + "[gain=2]")
     install("dikbench.formulations", theirs=_laws(ready=law))
     assert make_formulation("ready") == law
 
@@ -141,7 +127,7 @@ def test_two_plugins_of_one_name_are_an_error_that_names_both_files(install: Ins
         ours=_laws(dls=DampedLeastSquares),
         theirs=_laws(dls=PseudoInverse),
     )
-    message = _message(make_formulation, "dls")
+    message = error_of(make_formulation, "dls")
     assert message.startswith("two plug-ins are called 'dls'")
     assert "damped_least_squares.py" in message
     assert "pseudo_inverse.py" in message
@@ -160,7 +146,7 @@ def test_a_module_without_a_table_is_named(install: Install) -> None:
     module = ModuleType("formulations")
     module.__file__ = "/elsewhere/formulations/__init__.py"
     install("dikbench.formulations", builtin=module)
-    assert _message(make_formulation, "dls") == (
+    assert error_of(make_formulation, "dls") == (
         "plug-in 'builtin' of dikbench.formulations: /elsewhere/formulations/__init__.py holds no "
         "mapping FORMULATIONS"
     )
@@ -171,7 +157,7 @@ def test_a_table_of_the_wrong_type_is_named(install: Install) -> None:
     module = ModuleType("theirs")
     module.FORMULATIONS = [DampedLeastSquares]  # type: ignore[attr-defined]
     install("dikbench.formulations", theirs=module)
-    assert "holds no mapping FORMULATIONS" in _message(make_formulation, "dls")
+    assert "holds no mapping FORMULATIONS" in error_of(make_formulation, "dls")
 
 
 def test_a_plugin_that_cannot_be_imported_is_named(install: Install) -> None:
@@ -181,7 +167,7 @@ def test_a_plugin_that_cannot_be_imported_is_named(install: Install) -> None:
         raise ImportError("no module named theirs")
 
     install("dikbench.scenarios", theirs=load)
-    message = _message(make_scenario, "reach")
+    message = error_of(make_scenario, "reach")
     assert message == (
         "plug-in 'theirs' of dikbench.scenarios (theirs_module) cannot be imported: "
         "ImportError: no module named theirs"
@@ -193,7 +179,7 @@ def test_without_any_plugin_the_cure_is_given(install: Install, kind: str) -> No
     """An uninstalled checkout is an error with its cure, never an empty table."""
     install("dikbench.nothing")
     make: Callable[[str], object] = make_formulation if kind == "formulation" else make_scenario
-    message = _message(make, "reach")
+    message = error_of(make, "reach")
     assert f"no {kind}s are registered" in message
     assert "pip install -e ." in message
 
@@ -202,14 +188,14 @@ def test_without_any_plugin_the_cure_is_given(install: Install, kind: str) -> No
 def test_a_name_that_no_selector_could_say_is_an_error(install: Install, name: object) -> None:
     """Brackets, commas, blanks, nothing, or no text at all."""
     install("dikbench.formulations", theirs={name: DampedLeastSquares})
-    assert "is not a name" in _message(make_formulation, "dls")
+    assert "is not a name" in error_of(make_formulation, "dls")
 
 
 @pytest.mark.parametrize("build", [3, "dls", None])
 def test_an_entry_that_is_no_class_is_named(install: Install, build: object) -> None:
     """A table holds classes, or instances of one."""
     install("dikbench.formulations", theirs={"theirs": build})
-    assert _message(make_formulation, "theirs") == (
+    assert error_of(make_formulation, "theirs") == (
         "/somewhere/theirs.py: formulation 'theirs' is no class, nor an instance of one"
     )
 
@@ -217,7 +203,7 @@ def test_an_entry_that_is_no_class_is_named(install: Install, build: object) -> 
 def test_a_formulation_without_velocity_is_an_error(install: Install) -> None:
     """The message says which method is missing, and in which file."""
     install("dikbench.formulations", theirs={"dict": dict})
-    assert "'dict' has no method velocity(problem, solve)" in _message(make_formulation, "dict")
+    assert "'dict' has no method velocity(problem, solve)" in error_of(make_formulation, "dict")
 
 
 def test_a_function_is_no_family(install: Install) -> None:
@@ -227,11 +213,11 @@ def test_a_function_is_no_family(install: Install) -> None:
         """Return nothing at all."""
 
     install("dikbench.scenarios", theirs={"mine": mine})
-    assert _message(make_scenario, "mine") == (
+    assert error_of(make_scenario, "mine") == (
         "/somewhere/theirs.py: scenario 'mine' is no class, nor an instance of one"
     )
     install("dikbench.scenarios", theirs={"mine": DampedLeastSquares})
-    assert _message(make_scenario, "mine").endswith(
+    assert error_of(make_scenario, "mine").endswith(
         "scenario 'mine' is not derived from dikbench.scenario.Family"
     )
 
@@ -258,16 +244,16 @@ def _family(tmp_path: Path, field: str, case: str = "None", decorator: str = "")
 def test_what_a_family_does_wrong_is_one_line_with_its_selector(tmp_path: Path) -> None:
     """An exception of its own, a case that is none, a class that was not meant so."""
     selector = _family(tmp_path, "", "1 / 0")
-    assert _message(make_scenario, selector) == (
+    assert error_of(make_scenario, selector) == (
         f"scenario {selector}: ZeroDivisionError: division by zero"
     )
     selector = _family(tmp_path, "", "None")
-    assert _message(make_scenario, selector).startswith(f"scenario {selector}: AttributeError: ")
+    assert error_of(make_scenario, selector).startswith(f"scenario {selector}: AttributeError: ")
     selector = _family(tmp_path, "length: float = 1.0", decorator="# none")
-    message = _message(make_scenario, selector)
+    message = error_of(make_scenario, selector)
     assert message.endswith("scenario 'Mine': class Mine: write @dataclass(frozen=True) above it")
     selector = _family(tmp_path, "dt = 0.005")
-    message = _message(make_scenario, selector)
+    message = error_of(make_scenario, selector)
     assert "cannot be imported" in message
     assert "dt = 0.005 has no type" in message
 
@@ -278,10 +264,10 @@ def test_a_family_from_a_file(tmp_path: Path) -> None:
     plugin = scenario_plugin(selector)
     assert plugin.parameters["length"].default == 1.0
     assert plugin.file == selector.rpartition(":")[0]
-    assert "did you mean 'length'?" in _message(make_scenario, f"{selector}[lenght=2]")
-    assert "valid: Mine" in _message(make_scenario, selector.replace(":Mine", ":Mien"))
+    assert "did you mean 'length'?" in error_of(make_scenario, f"{selector}[lenght=2]")
+    assert "valid: Mine" in error_of(make_scenario, selector.replace(":Mine", ":Mien"))
     missing = f"{tmp_path}/none.py"
-    assert _message(make_scenario, f"{missing}:Mine") == f"scenario file not found: {missing}"
+    assert error_of(make_scenario, f"{missing}:Mine") == f"scenario file not found: {missing}"
 
 
 def test_a_family_without_a_variation_takes_seeds(tmp_path: Path) -> None:
@@ -296,4 +282,83 @@ def test_a_family_without_a_variation_takes_seeds(tmp_path: Path) -> None:
     path.write_text(path.read_text().replace("Case, Family", names, 1))
     first, second = make_scenario(selector, 0), make_scenario(selector, 1)
     assert (first.q0 == second.q0).all()
-    assert "seed -1 must not be negative" in _message(make_scenario, selector, -1)
+    assert "seed -1 must not be negative" in error_of(make_scenario, selector, -1)
+
+
+def _reach(robot: str = "planar3r", seed: int = 0) -> object:
+    """A function that gives a scenario."""
+    return Reach(robot=robot).scenario(seed)
+
+
+@pytest.mark.parametrize(
+    ("entry", "words"),
+    [
+        (_reach, "scenario 'theirs' is no class, nor an instance of one"),
+        (partial(_reach, "ur5"), "scenario 'theirs' is no class, nor an instance of one"),
+        (dict, "scenario 'theirs' is not derived from dikbench.scenario.Family"),
+        (DampedLeastSquares(), "scenario 'theirs' is not derived from dikbench.scenario.Family"),
+    ],
+)
+def test_a_family_is_a_class_derived_from_family(
+    install: Install, entry: object, words: str
+) -> None:
+    """Nothing else makes scenarios: the message says what is missing, and in which file."""
+    install("dikbench.scenarios", theirs={"theirs": entry})
+    assert error_of(make_scenario, "theirs") == f"/somewhere/theirs.py: {words}"
+
+
+def test_a_family_that_does_not_make_a_scenario_is_named(install: Install) -> None:
+    """With the selector and what went wrong, whatever it is."""
+    install("dikbench.scenarios", theirs={"empty": Empty})
+    message = error_of(make_scenario, "empty")
+    assert message.startswith("scenario empty: AttributeError: ")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Empty(Family):
+    """A family without a case."""
+
+    def case(self, robot: Robot, change: Perturbation) -> Any:
+        """See `Family`."""
+        return None
+
+
+def test_a_family_with_other_defaults_keeps_ranges_and_seeds(install: Install) -> None:
+    """What the base declares of a parameter holds for a new default too; other seeds differ."""
+    install("dikbench.scenarios", theirs={"near": Near})
+    scenario = make_scenario("near[acceleration=true]")
+    assert scenario.robot.limits.acceleration is not None
+    assert scenario.robot.name == "planar3r"
+    assert np.array_equal(scenario.q0, make_scenario("near", 0).q0)
+    assert not np.array_equal(scenario.q0, make_scenario("near", 1).q0)
+    assert "distance='far' is not valid" in error_of(make_scenario, "near[distance=far]")
+    assert "distance=1.0 must be 0.01 to 0.3" in error_of(make_scenario, "near[distance=1]")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Near(Reach):
+    """Reach with other defaults."""
+
+    robot: str = "planar3r"
+    distance: float = 0.05
+
+
+def test_a_default_without_a_type_is_refused() -> None:
+    """Python would make it no parameter: the message says what to write."""
+
+    def define() -> object:
+        return type("Bare", (Reach,), {"distance": 0.05})
+
+    message = error_of(define)
+    assert "distance = 0.05 has no type" in message
+    assert "write distance: float = 0.05" in message
+
+
+def test_a_formulation_without_types_has_those_of_its_defaults(tmp_path: Path) -> None:
+    """A plug-in's annotations need not be found: then numbers stay numbers, and words words."""
+    selector = law_with(
+        tmp_path, 'gain: Number = 1.0\n    careful: Flag = False\n    mode: Word = "fast"'
+    )
+    law: Any = make_formulation(f"{selector}[gain=0.5,careful=true,mode=slow]")
+    assert (law.gain, law.careful, law.mode) == (0.5, True, "slow")
+    assert "gain='far' is not valid" in error_of(make_formulation, f"{selector}[gain=far]")

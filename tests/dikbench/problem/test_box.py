@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from makers.problems import interval_of, limits_at_distances, problem_at
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.problem import DikProblem
 from dikbench.problem.velocity_box import Braking, velocity_box
 from dikbench.robots.braking import viable_brake
 from dikbench.robots.catalogue import load_robot
-from dikbench.robots.limits import Interval, JointLimits, Limits
+from dikbench.robots.limits import JointLimits
 
 BRAKINGS = get_args(Braking)
 
@@ -25,39 +25,10 @@ speeds = st.floats(0.1, 10.0)
 distances = st.floats(1e-6, 3.0)
 
 
-def _interval(value: object, n: int) -> Interval | None:
-    """A pair (lower, upper), a symmetric magnitude, or None."""
-    if value is None:
-        return None
-    lower, upper = value if isinstance(value, tuple) else (-np.asarray(value), value)
-    return Interval(*(np.broadcast_to(np.asarray(side, float), (n,)) for side in (lower, upper)))
-
-
-def _limits(
-    to_lower: object,
-    to_upper: object,
-    *,
-    velocity: object = None,
-    acceleration: object = None,
-) -> Limits:
-    """Limits of joints whose distances to their position limits are given, (nv,)."""
-    below, above = (np.atleast_1d(np.asarray(d, float)) for d in (to_lower, to_upper))
-    n = len(below)
-    joint = JointLimits(
-        nv=n,
-        q_index=np.arange(n),
-        position=Interval(-below, above),
-        velocity=_interval(velocity, n),
-        acceleration=_interval(acceleration, n),
-        effort=None,
-    )
-    return joint.at(np.zeros(n))
-
-
 @pytest.mark.parametrize("braking", BRAKINGS)
 def test_a_joint_that_cannot_accelerate_stays_at_rest(braking: Braking) -> None:
     """An acceleration limit of zero is a bound like any other: no NaN, and the velocity is kept."""
-    limits = _limits([0.1, 3.0], [3.0, 100.0], velocity=2.0, acceleration=0.0)
+    limits = limits_at_distances([0.1, 3.0], [3.0, 100.0], velocity=2.0, acceleration=0.0)
     box = velocity_box(limits, np.zeros(2), 0.01, braking)
     assert np.array_equal(box.lower, [0.0, 0.0])
     assert np.array_equal(box.upper, [0.0, 0.0])
@@ -76,7 +47,7 @@ def test_without_acceleration_limits_there_is_no_brake(
     below: float, above: float, vmax: float, dt: float, v_prev: float, braking: Braking
 ) -> None:
     """`viable` and `sqrt` are `one-step` then: hi = min(vmax, d/dt)."""
-    limits = _limits(below, above, velocity=vmax)
+    limits = limits_at_distances(below, above, velocity=vmax)
     box = velocity_box(limits, np.array([v_prev]), dt, braking)
     plain = velocity_box(limits, np.array([v_prev]), dt, "one-step")
     assert (box.lower, box.upper) == (plain.lower, plain.upper)
@@ -86,7 +57,7 @@ def test_without_acceleration_limits_there_is_no_brake(
 
 def test_without_a_previous_velocity_only_the_brake_remains() -> None:
     """v_prev = None drops the bound on acceleration, not the one on braking."""
-    box = velocity_box(_limits(1.0, 0.01, velocity=2.0, acceleration=5.0), None, 0.01)
+    box = velocity_box(limits_at_distances(1.0, 0.01, velocity=2.0, acceleration=5.0), None, 0.01)
     assert box.upper == viable_brake(np.array([0.01]), np.array([5.0]), 0.01)
     assert box.lower == -2.0
     assert box.relaxed == 0
@@ -95,19 +66,20 @@ def test_without_a_previous_velocity_only_the_brake_remains() -> None:
 def test_each_bound_alone_is_the_bound() -> None:
     """Hi and lo follow each side of the velocity, acceleration and position limits."""
     dt, v = 0.01, np.array([0.5])
-    far = _limits(9.0, 9.0, velocity=(-1.0, 2.0), acceleration=(-np.inf, np.inf))
-    assert (velocity_box(far, v, dt).lower, velocity_box(far, v, dt).upper) == (-1.0, 2.0)
-    slow = _limits(9.0, 9.0, velocity=9.0, acceleration=(-4.0, 7.0))
+    far = limits_at_distances(9.0, 9.0, velocity=(-1.0, 2.0), acceleration=(-np.inf, np.inf))
+    assert velocity_box(far, v, dt).lower == -1.0
+    assert velocity_box(far, v, dt).upper == 2.0
+    slow = limits_at_distances(9.0, 9.0, velocity=9.0, acceleration=(-4.0, 7.0))
     assert velocity_box(slow, v, dt).lower == pytest.approx(0.5 - 0.04)
     assert velocity_box(slow, v, dt).upper == pytest.approx(0.5 + 0.07)
-    near = _limits(0.003, 0.002, velocity=9.0)
+    near = limits_at_distances(0.003, 0.002, velocity=9.0)
     assert velocity_box(near, v, dt).lower == pytest.approx(-0.3)
     assert velocity_box(near, v, dt).upper == pytest.approx(0.2)
 
 
 def test_the_brake_uses_the_acceleration_that_slows_down() -> None:
     """Towards the upper limit the lower acceleration bound brakes, and the other way round."""
-    limits = _limits(0.05, 0.05, velocity=9.0, acceleration=(-2.0, 8.0))
+    limits = limits_at_distances(0.05, 0.05, velocity=9.0, acceleration=(-2.0, 8.0))
     box = velocity_box(limits, None, 1e-3)
     # Continuous braking sqrt(2 a d), met to first order in dt.
     assert box.upper == pytest.approx(np.sqrt(2 * 2.0 * 0.05), rel=0.02)
@@ -117,7 +89,7 @@ def test_the_brake_uses_the_acceleration_that_slows_down() -> None:
 @pytest.mark.parametrize("gain", [0.05, 0.5, 0.95, 1.0])
 def test_gain_scales_the_position_bound(gain: float) -> None:
     """The bounds are hi = gain d/dt and lo = -gain d/dt, whatever the acceleration limits are."""
-    limits = _limits(0.003, 0.002, acceleration=1e9)
+    limits = limits_at_distances(0.003, 0.002, acceleration=1e9)
     box = velocity_box(limits, np.zeros(1), 0.01, "gain", gain)
     assert box.upper == pytest.approx(gain * 0.2)
     assert box.lower == pytest.approx(-gain * 0.3)
@@ -126,7 +98,7 @@ def test_gain_scales_the_position_bound(gain: float) -> None:
 @pytest.mark.parametrize("braking", sorted(set(BRAKINGS) - {"gain"}))
 def test_the_position_gain_belongs_to_gain_braking(braking: Braking) -> None:
     """The other ways to brake do not read it."""
-    limits = _limits(0.003, 0.002, velocity=1.0, acceleration=10.0)
+    limits = limits_at_distances(0.003, 0.002, velocity=1.0, acceleration=10.0)
     a, b = (velocity_box(limits, np.zeros(1), 0.01, braking, gain) for gain in (0.1, 0.9))
     assert (a.lower, a.upper) == (b.lower, b.upper)
 
@@ -144,16 +116,18 @@ def test_more_room_never_means_less_speed(
 ) -> None:
     """Hi grows with the distance to the upper limit, and -lo with that to the lower one."""
     distance = np.array([near, near + farther])
-    limits = _limits(np.full(2, 9.0), distance, velocity=5.0, acceleration=acceleration)
+    limits = limits_at_distances(np.full(2, 9.0), distance, velocity=5.0, acceleration=acceleration)
     upper = velocity_box(limits, None, dt, braking).upper
     assert upper[0] <= upper[1] + 1e-12
-    mirrored = _limits(distance, np.full(2, 9.0), velocity=5.0, acceleration=acceleration)
+    mirrored = limits_at_distances(
+        distance, np.full(2, 9.0), velocity=5.0, acceleration=acceleration
+    )
     assert np.array_equal(velocity_box(mirrored, None, dt, braking).lower, -upper)
 
 
 def test_position_wins_over_acceleration_and_is_counted() -> None:
     """A joint too fast to stop gets the position bound alone; the one beside it loses nothing."""
-    limits = _limits([9.0, 9.0], [0.001, 9.0], velocity=3.0, acceleration=10.0)
+    limits = limits_at_distances([9.0, 9.0], [0.001, 9.0], velocity=3.0, acceleration=10.0)
     box = velocity_box(limits, np.array([2.0, 2.0]), 0.01)
     assert box.lower == pytest.approx([0.1, 1.9])
     assert box.upper == pytest.approx([0.1, 2.1])
@@ -162,7 +136,7 @@ def test_position_wins_over_acceleration_and_is_counted() -> None:
 
 def test_velocity_wins_over_acceleration_and_is_counted() -> None:
     """A joint that is faster than its limit is brought down to it at once."""
-    limits = _limits([9.0, 9.0, 9.0], [9.0, 9.0, 9.0], velocity=2.0, acceleration=10.0)
+    limits = limits_at_distances([9.0, 9.0, 9.0], [9.0, 9.0, 9.0], velocity=2.0, acceleration=10.0)
     box = velocity_box(limits, np.array([3.0, -3.0, 2.05]), 0.01)
     assert box.lower == pytest.approx([2.0, -2.0, 1.95])
     assert box.upper == pytest.approx([2.0, -2.0, 2.0])
@@ -171,7 +145,7 @@ def test_velocity_wins_over_acceleration_and_is_counted() -> None:
 
 def test_position_wins_over_velocity_and_acceleration_together() -> None:
     """Near the lower limit, too fast for every bound: only the position bound is left."""
-    limits = _limits([0.001], [9.0], velocity=2.0, acceleration=10.0)
+    limits = limits_at_distances([0.001], [9.0], velocity=2.0, acceleration=10.0)
     box = velocity_box(limits, np.array([-5.0]), 0.01)
     assert box.lower == pytest.approx([-0.1])
     assert box.upper == pytest.approx([-0.1])
@@ -182,7 +156,7 @@ def test_a_problem_records_what_its_box_gave_up() -> None:
     """`problem.box` leaves the number of relaxed joints in `problem.relaxed`."""
     robot = load_robot("planar3r").with_limits(velocity=2.0, acceleration=10.0)
     v_prev = np.array([3.0, 0.0, -3.0])
-    problem = DikProblem(robot, robot.q0, v_prev, 0.01, [], robot.limits.at(robot.q0))
+    problem = problem_at(robot, robot.q0, [], v_prev)
     assert problem.relaxed == 0
     assert problem.box().relaxed == 2
     assert problem.relaxed == 2
@@ -206,7 +180,7 @@ def test_outside_a_limit_the_box_asks_for_the_way_back(
     braking: Braking,
 ) -> None:
     """Hi = max(d/dt, -0.1 vmax) above the upper limit, mirrored below the lower one."""
-    limits = _limits(
+    limits = limits_at_distances(
         [5.0, -outside], [-outside, 5.0], velocity=(-v_down, v_up), acceleration=acceleration
     )
     box = velocity_box(limits, None, dt, braking)
@@ -217,7 +191,7 @@ def test_outside_a_limit_the_box_asks_for_the_way_back(
 
 def test_the_way_back_wins_over_acceleration() -> None:
     """From rest 0.2 rad/s back at once is more than 10 rad/s^2 in 10 ms: given up and counted."""
-    limits = _limits([5.0], [-0.3], velocity=2.0, acceleration=10.0)
+    limits = limits_at_distances([5.0], [-0.3], velocity=2.0, acceleration=10.0)
     box = velocity_box(limits, np.zeros(1), 0.01)
     assert box.upper == pytest.approx([-0.2])
     assert box.lower == pytest.approx([-0.2])
@@ -230,7 +204,7 @@ def test_the_way_back_does_not_run_through_the_other_limit(
     braking: Braking, velocity: float | None
 ) -> None:
     """In a narrow range the brake before the far limit bounds the way back: never lower > upper."""
-    limits = _limits([0.31, -0.3], [-0.3, 0.31], velocity=velocity, acceleration=0.5)
+    limits = limits_at_distances([0.31, -0.3], [-0.3, 0.31], velocity=velocity, acceleration=0.5)
     box = velocity_box(limits, None, 0.01, braking, position_gain=0.1)
     assert np.all(box.lower <= box.upper)
     assert box.upper[0] < 0 < box.lower[1]
@@ -238,7 +212,7 @@ def test_the_way_back_does_not_run_through_the_other_limit(
 
 def test_the_way_back_without_velocity_limits_takes_one_step() -> None:
     """Hi = d/dt then: there is no speed to bound it by."""
-    box = velocity_box(_limits([5.0, -0.1], [-0.3, 5.0]), None, 0.01)
+    box = velocity_box(limits_at_distances([5.0, -0.1], [-0.3, 5.0]), None, 0.01)
     assert box.upper[0] == pytest.approx(-30.0)
     assert box.lower[1] == pytest.approx(10.0)
 
@@ -255,7 +229,9 @@ def test_infinite_limits_never_give_nan(braking: Braking, v_prev: Array | None) 
         ([inf, -0.1, 5.0], [inf, 5.0, -0.1], inf, 5.0),
         ([inf, -0.1, 5.0], [inf, 5.0, -0.1], None, inf),
     ):
-        limits = _limits(to_lower, to_upper, velocity=velocity, acceleration=acceleration)
+        limits = limits_at_distances(
+            to_lower, to_upper, velocity=velocity, acceleration=acceleration
+        )
         box = velocity_box(limits, v_prev, 0.01, braking)
         assert not np.isnan(box.lower).any()
         assert not np.isnan(box.upper).any()
@@ -272,7 +248,7 @@ def test_without_any_limit_the_box_is_infinite() -> None:
 
 def test_without_position_limits_the_others_remain() -> None:
     """Velocity and acceleration limits do not need position limits."""
-    joint = JointLimits(1, np.zeros(1, int), None, _interval(2.0, 1), _interval(5.0, 1), None)
+    joint = JointLimits(1, np.zeros(1, int), None, interval_of(2.0, 1), interval_of(5.0, 1), None)
     box = velocity_box(joint.at(np.zeros(1)), np.array([1.98]), 0.01)
     assert box.upper == pytest.approx([2.0])
     assert box.lower == pytest.approx([1.93])
@@ -299,7 +275,7 @@ def test_the_box_is_sound_at_any_state(
 ) -> None:
     """Whatever came before: bounds in order, inside vmax, and no limit is passed from inside."""
     above = range_ - below
-    limits = _limits(below, above, velocity=vmax, acceleration=acceleration)
+    limits = limits_at_distances(below, above, velocity=vmax, acceleration=acceleration)
     box = velocity_box(limits, np.array([v_prev]), dt, braking)
     assert -vmax <= box.lower <= box.upper <= vmax
     assert box.relaxed in {0, 1}
@@ -315,4 +291,4 @@ def test_the_box_is_sound_at_any_state(
 def test_an_unknown_braking_names_the_valid_ones() -> None:
     """A typing error is an error with the nearest match, not a silent default."""
     with pytest.raises(DikbenchError, match=r"'viabel'; did you mean 'viable'\? valid: gain"):
-        velocity_box(_limits(1.0, 1.0), None, 0.01, "viabel")  # type: ignore[arg-type]
+        velocity_box(limits_at_distances(1.0, 1.0), None, 0.01, "viabel")  # type: ignore[arg-type]

@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from makers.problems import problem_of
 
 from dikbench.arrays import Array
 from dikbench.plugins.building import make_formulation, make_scenario
@@ -113,7 +114,7 @@ def test_a_problem_made_by_hand_is_sorted(priorities: list[int]) -> None:
         for k, p in enumerate(priorities)
     ]
     tasks = [*given_tasks]
-    problem = DikProblem(robot, robot.q0, None, 0.01, tasks, robot.limits.at(robot.q0))
+    problem = problem_of(*tasks, robot=robot)
     expected = [k for p in range(1, 5) for k, q in enumerate(priorities) if p == q]
     assert [int(task.V[0]) for task in problem.tasks] == expected
     assert np.concatenate([level.V for level in problem.levels]).tolist() == expected

@@ -6,45 +6,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from makers.problems import limits_at_distances
 
 from dikbench.arrays import Array
 from dikbench.problem.velocity_box import Braking, velocity_box
 from dikbench.robots.braking import sqrt_brake, viable_brake
-from dikbench.robots.limits import Interval, JointLimits, Limits
 
 periods = st.floats(5e-4, 0.05)
 accelerations = st.floats(0.5, 50.0)
 speeds = st.floats(0.1, 10.0)
 distances = st.floats(1e-6, 3.0)
-
-
-def _interval(value: object, n: int) -> Interval | None:
-    """A pair (lower, upper), a symmetric magnitude, or None."""
-    if value is None:
-        return None
-    lower, upper = value if isinstance(value, tuple) else (-np.asarray(value), value)
-    return Interval(*(np.broadcast_to(np.asarray(side, float), (n,)) for side in (lower, upper)))
-
-
-def _limits(
-    to_lower: object,
-    to_upper: object,
-    *,
-    velocity: object = None,
-    acceleration: object = None,
-) -> Limits:
-    """Limits of joints whose distances to their position limits are given, (nv,)."""
-    below, above = (np.atleast_1d(np.asarray(d, float)) for d in (to_lower, to_upper))
-    n = len(below)
-    joint = JointLimits(
-        nv=n,
-        q_index=np.arange(n),
-        position=Interval(-below, above),
-        velocity=_interval(velocity, n),
-        acceleration=_interval(acceleration, n),
-        effort=None,
-    )
-    return joint.at(np.zeros(n))
 
 
 def _stopping_distance(speed: float, deceleration: float, dt: float) -> float:
@@ -78,7 +49,9 @@ class _Rollout:
         x, v = np.zeros(len(below)), np.zeros(len(below))
         applied = [v]
         for choice in choices:
-            limits = _limits(x + below, above - x, velocity=velocity, acceleration=acceleration)
+            limits = limits_at_distances(
+                x + below, above - x, velocity=velocity, acceleration=acceleration
+            )
             box = velocity_box(limits, v, dt, braking)
             assert np.all(box.lower <= box.upper)
             self.relaxed += box.relaxed

@@ -1,20 +1,14 @@
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
-import pandas as pd
 from click.testing import CliRunner
+from makers.rows import make_rows, write_results
 
 from dikbench.cli import commands
 
-MakeRows = Callable[..., pd.DataFrame]
-WriteResults = Callable[..., Path]
 
-
-def test_a_report_is_remade_by_its_command(
-    tmp_path: Path, make_rows: MakeRows, write_results: WriteResults
-) -> None:
+def test_a_report_is_remade_by_its_command(tmp_path: Path) -> None:
     """It prints the tables and where the page is; made twice it is the same."""
     folder = write_results(tmp_path / "out", make_rows({"pinv": {}, "dls": {}}))
     pages = []
@@ -35,9 +29,7 @@ def test_a_folder_without_results_is_one_line_on_stderr(tmp_path: Path) -> None:
     )
 
 
-def test_a_folder_that_cannot_be_written_is_one_line(
-    tmp_path: Path, make_rows: MakeRows, write_results: WriteResults
-) -> None:
+def test_a_folder_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
     """A file in the place of the figures is named as the reason."""
     folder = write_results(tmp_path / "out", make_rows({"pinv": {}}))
     (folder / "figures").write_text("")

@@ -9,7 +9,7 @@ import pytest
 
 from dikbench.metrics import METRICS
 from dikbench.results.columns import KEYS, REDEFINED, RENAMED_METRICS, RENAMED_TIMES, TIMED
-from dikbench.results.store import SCHEMA, Store
+from dikbench.results.store import SCHEMA_VERSION, Store
 
 ROW = {
     "id": "a",
@@ -44,4 +44,4 @@ def test_columns_of_earlier_versions_have_the_names_of_today(tmp_path: Path, sch
         assert cell["formulation_time_median_us"] == 7.0
     with sqlite3.connect(path) as database:
         found = database.execute("SELECT value FROM meta WHERE key = 'schema'").fetchone()
-    assert found == (str(SCHEMA),)
+    assert found == (str(SCHEMA_VERSION),)

@@ -69,6 +69,7 @@ def test_acceleration_limits_are_a_table_with_its_source(name: str) -> None:
     assert robot.available_acceleration.shape == (robot.nv,)
     assert np.all(robot.available_acceleration > 0)
     assert entry.acceleration_source
+    assert entry.acceleration is not None
     in_force = robot.with_limits(acceleration=robot.available_acceleration).limits.acceleration
     assert in_force is not None
     assert np.array_equal(in_force.upper, entry.acceleration)

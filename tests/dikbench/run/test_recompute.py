@@ -16,6 +16,7 @@ import pytest
 from dikbench.errors import DikbenchError
 from dikbench.metrics import METRICS
 from dikbench.results.folder import ResultsFolder
+from dikbench.results.reading import load_results
 from dikbench.run.recompute import Recomputed, recompute_results
 from dikbench.run.runner import RunSettings, run_study, status_of
 from dikbench.study.study import Cells, Study
@@ -45,7 +46,7 @@ def copied(folder: Path, target: Path) -> Path:
 
 def moved(folder: Path) -> pd.DataFrame:
     """The trials that made steps."""
-    trials = ResultsFolder(folder).read()[0]
+    trials = load_results(folder).trials
     return trials[trials["steps"] > 0]
 
 
@@ -60,11 +61,11 @@ def test_a_fresh_run_is_recomputed_to_the_same_bits(fresh: Path, tmp_path: Path)
     """Every exported table, whatever the plant and the reference; the manifest knows of it."""
     copy = copied(fresh, tmp_path / "copy")
     before = {name: (copy / name).read_bytes() for name in ("trials.csv", "timing.csv")}
-    stored = ResultsFolder(copy).read()[0]
+    stored = load_results(copy).trials
     done = recompute_results(copy, 1, "dikbench recompute")
     assert str(done) == f"{len(moved(copy))} trials recomputed"
     assert {name: (copy / name).read_bytes() for name in before} == before
-    pd.testing.assert_frame_equal(ResultsFolder(copy).read()[0], stored, check_exact=True)
+    pd.testing.assert_frame_equal(load_results(copy).trials, stored, check_exact=True)
     noted = json.loads((copy / "manifest.json").read_text())
     assert noted["command"] == "a test"
     assert noted["recomputed"]["command"] == "dikbench recompute"
@@ -138,7 +139,7 @@ def test_metrics_that_were_tampered_with_or_lost_are_restored(fresh: Path, harme
 
 def test_nothing_but_metrics_is_touched(harmed: Harmed) -> None:
     """Not even a message or a time that is wrong."""
-    found = ResultsFolder(harmed.folder).read()[0]
+    found = load_results(harmed.folder).trials
     assert set(found["message"]) == {"x"}
     assert set(found["wall_time_s"]) == {9.0}
 

@@ -11,7 +11,7 @@ import pytest
 
 from dikbench.plugins.building import make_scenario
 from dikbench.problem.tasks import PositionTask
-from dikbench.results.folder import ResultsFolder
+from dikbench.results.reading import read_results
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
 from dikbench.run.runner import RunSettings, run_study
@@ -68,13 +68,13 @@ def test_a_study_runs_the_oracle_once_per_scenario_and_seed(tmp_path: Path) -> N
         timing=TimingSettings("dls", 10, 1),
         name="oracle",
     )
-    planned = [p.trial for p in expand(study) if p.trial.formulation == ORACLE]
-    assert [(t.plant, t.reference, t.seed) for t in planned] == [
+    planned = [p.trial for p in expand(study) if p.trial.formulation.name == ORACLE]
+    assert [(str(t.plant), t.reference, t.seed) for t in planned] == [
         ("ideal", "time", 0),
         ("ideal", "time", 1),
     ]
     run_study(study, tmp_path / "out", RunSettings(jobs=1), "test")
-    trials, _ = ResultsFolder(tmp_path / "out").read()
+    trials = read_results(tmp_path / "out").trials
     assert (trials["status"] == "ok").all()
     times = pd.read_csv(tmp_path / "out" / "timing.csv")
     assert set(times["formulation"]) == {"dls"}

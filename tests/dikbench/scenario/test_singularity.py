@@ -7,6 +7,7 @@ from math import atan, pi
 import numpy as np
 import pinocchio as pin
 import pytest
+from makers.scenarios import known_singularity
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
@@ -14,7 +15,7 @@ from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics, smallest_singular_value
 from dikbench.robots.robot import Robot
 from dikbench.scenario.oracle import position_margin
-from dikbench.scenario.singularity import Singularity, analyse, make_singular, singular_postures
+from dikbench.scenario.singularity import analyse, make_singular, singular_postures
 from scenarios.singular_postures import SINGULAR_POSTURES
 
 KNOWN = [(robot, name) for robot, postures in SINGULAR_POSTURES.items() for name in postures]
@@ -27,17 +28,10 @@ def _jacobian(robot: Robot, q: Array) -> Array:
     return kinematics.jacobian(robot.frame_id)[list(robot.task_rows)].copy()
 
 
-def _known(robot: str, name: str) -> tuple[Robot, Singularity]:
-    arm = load_robot(robot)
-    seed = np.array(SINGULAR_POSTURES[robot][name].posture)  # type: ignore[index]
-    q = make_singular(arm, pin.integrate(arm.model, pin.neutral(arm.model), seed))
-    return arm, analyse(arm, q)
-
-
 @pytest.mark.parametrize(("robot", "name"), KNOWN)
 def test_known_postures_are_exactly_singular_and_inside_the_limits(robot: str, name: str) -> None:
     """The smallest singular value is rounding, the one above it is not; nothing moves along n."""
-    arm, where = _known(robot, name)
+    arm, where = known_singularity(robot, name)
     values = np.linalg.svd(_jacobian(arm, where.q), compute_uv=False)
     assert values[5] < 1e-9
     assert values[4] > 0.01
@@ -64,7 +58,7 @@ def test_known_postures_are_where_geometry_says(
     robot: str, name: str, joint: int, value: float
 ) -> None:
     """The joint that makes the arm singular stands where a drawing of the arm puts it."""
-    arm, where = _known(robot, name)
+    arm, where = known_singularity(robot, name)
     found = pin.difference(arm.model, pin.neutral(arm.model), where.q)[joint]
     assert found == pytest.approx(value, abs=1e-6)
 
@@ -81,13 +75,13 @@ def test_known_postures_are_where_geometry_says(
 )
 def test_kinds_of_known_singularities(robot: str, name: str, kind: str) -> None:
     """Wrists of six axes are crossed, elbows are edges, seven axes have saddles."""
-    assert _known(robot, name)[1].kind == kind
+    assert known_singularity(robot, name)[1].kind == kind
 
 
 @pytest.mark.parametrize(("robot", "name"), KNOWN)
 def test_curvature_is_what_the_arm_does(robot: str, name: str) -> None:
     """Bent by z, the frame has moved by curvature z^2 / 2 along n, to third order; if at all."""
-    arm, where = _known(robot, name)
+    arm, where = known_singularity(robot, name)
     kinematics, z = Kinematics(arm), 1e-3
     for side in (1, -1):
         kinematics.update(pin.integrate(arm.model, where.q, side * z * where.bend))
@@ -106,7 +100,7 @@ def test_no_motion_leads_over_the_edge_of_a_fold(robot: str) -> None:
     if robot == "planar3r":
         where = analyse(arm, make_singular(arm, np.array([0.3, 0.1, 1.1])))
     else:
-        where = _known(robot, "elbow")[1]
+        where = known_singularity(robot, "elbow")[1]
     assert where.kind == "fold"
     Z = np.linalg.svd(where.jacobian)[2][len(arm.task_rows) - 1 :]
     random, kinematics = np.random.default_rng(0), Kinematics(arm)
@@ -120,7 +114,7 @@ def test_no_motion_leads_over_the_edge_of_a_fold(robot: str) -> None:
 @pytest.mark.parametrize(("robot", "name"), KNOWN)
 def test_growth_is_the_one_sided_derivative_of_the_singular_value(robot: str, name: str) -> None:
     """Joint by joint, by a small step to either side."""
-    arm, where = _known(robot, name)
+    arm, where = known_singularity(robot, name)
     for joint, growth in enumerate(where.growth):
         for side in (1, -1):
             step = np.zeros(arm.nv)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -13,97 +14,33 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from makers.problems import problem_at
+from makers.scenarios import RATE, at_step, exact, planar_scenario, raises, run_on_planar
 
 from dikbench.arrays import Array
 from dikbench.errors import Infeasible, SolverFailed
-from dikbench.problem import DikProblem, Formulation, Solve
-from dikbench.problem.tasks import PoseTask
+from dikbench.problem import DikProblem, Solve
 from dikbench.programs.answer import Answer
 from dikbench.programs.quadratic_program import ProgramKind, QuadraticProgram
 from dikbench.robots.catalogue import load_robot
-from dikbench.scenario import Scenario
-from dikbench.scenario.certificate import Certificate
-from dikbench.scenario.plant import Ideal, Plant
-from dikbench.scenario.reference.reference import joint_path, target_at_rest
-from dikbench.simulation.closed_loop import ERROR_CHECK_PERIOD, Run, simulate
+from dikbench.scenario.reference.reference import target_at_rest
+from dikbench.simulation.closed_loop import ERROR_CHECK_PERIOD_STEPS
 from dikbench.simulation.control_step import fallback
 from dikbench.simulation.status import STEP_CODE, Status
 from dikbench.solvers.catalogue.back_ends import parse_solver
 from dikbench.solvers.checked_solve import CheckedSolve, make_solve
 
-RATE = np.array([0.5, -0.4, 0.6])
-
-
-def _scenario(
-    *, dt: float = 0.01, duration: float = 0.3, rate: Array = RATE, **limits: Any
-) -> Scenario:
-    """A planar arm that is to follow the pose of q0 + t rate, from its own velocity on."""
-    robot = load_robot("planar3r").with_limits(**limits)
-    q0 = np.array([0.4, 0.8, 0.7])
-    return Scenario(
-        robot=robot,
-        q0=q0,
-        v0=rate.copy(),
-        reference=joint_path(robot, lambda tau: q0 + tau * rate, lambda tau: rate, duration),
-        tracking=PoseTask(gain=2.0),
-        dt=dt,
-        duration=duration,
-        certificate=Certificate(()),
-    )
-
-
-class _Law:
-    """A law made of a function of the problem; it keeps the problems that it saw."""
-
-    def __init__(self, velocity: Callable[[DikProblem], Any]) -> None:
-        self.answer = velocity
-        self.seen: list[DikProblem] = []
-
-    def velocity(self, problem: DikProblem, solve: Solve) -> Any:
-        self.seen.append(problem)
-        return self.answer(problem)
-
-
-def _exact(problem: DikProblem) -> Array:
-    """The velocity that does the task."""
-    v: Array = np.linalg.solve(problem.primary.J, problem.primary.V)
-    return v
-
-
-def _run(
-    law: Formulation | Callable[[DikProblem], Any],
-    scenario: Scenario | None = None,
-    *,
-    plant: Plant | None = None,
-    mode: Any = "time",
-    solve: CheckedSolve | None = None,
-) -> Run:
-    formulation = law if isinstance(law, Formulation) else _Law(law)
-    chosen = make_solve(None, None) if solve is None else solve
-    return simulate(scenario or _scenario(), formulation, chosen, plant or Ideal(), mode)
-
-
 # --- how laws end a trial
-
-
-def _at_step(k: int, wrong: Callable[[], Any]) -> Callable[[DikProblem], Any]:
-    """A law that does the task until step k, and then something wrong."""
-    steps = iter(range(10**6))
-    return lambda problem: wrong() if next(steps) == k else _exact(problem)
-
-
-def _raise(error: BaseException) -> Any:
-    raise error
 
 
 @pytest.mark.parametrize(
     ("wrong", "status", "message"),
     [
-        (lambda: _raise(ValueError("no\nsecond line")), "formulation-error", "ValueError: no$"),
-        (lambda: _raise(KeyError("gain")), "formulation-error", "KeyError: 'gain'$"),
-        (lambda: _raise(RuntimeError()), "formulation-error", "RuntimeError"),
+        (lambda: raises(ValueError("no\nsecond line")), "formulation-error", "ValueError: no$"),
+        (lambda: raises(KeyError("gain")), "formulation-error", "KeyError: 'gain'$"),
+        (lambda: raises(RuntimeError()), "formulation-error", "RuntimeError"),
         (lambda: np.linalg.inv(np.zeros((3, 3))), "formulation-error", "LinAlgError: Singular"),
-        (lambda: _raise(MemoryError()), "out-of-memory", ""),
+        (lambda: raises(MemoryError()), "out-of-memory", ""),
         (lambda: np.zeros(2), "wrong-shape", r"expected \(3,\), got \(2,\)$"),
         (lambda: np.zeros((3, 1)), "wrong-shape", r"expected \(3,\), got \(3, 1\)$"),
         (lambda: np.float64(1.0), "wrong-shape", r"expected \(3,\), got \(\)$"),
@@ -123,7 +60,7 @@ def test_a_law_that_goes_wrong_ends_its_trial(
     wrong: Callable[[], Any], status: str, message: str, k: int, mode: str
 ) -> None:
     """With a status, the step and the reason on one line, and the steps before it in the trace."""
-    run = _run(_at_step(k, wrong), mode=mode)
+    run = run_on_planar(at_step(k, wrong), mode=mode)
     assert run.status.value == status
     assert re.search(rf"^step {k}: .*{message}", run.message)
     assert "\n" not in run.message
@@ -136,27 +73,28 @@ def test_a_law_that_goes_wrong_ends_its_trial(
 @pytest.mark.parametrize("kind", [np.float32, np.int64])
 def test_a_law_may_answer_in_other_numbers(kind: type) -> None:
     """Single precision and integers are numbers: the run goes on."""
-    run = _run(lambda problem: np.array([0, 1, -1], dtype=kind))
+    run = run_on_planar(lambda problem: np.array([0, 1, -1], dtype=kind))
     assert run.status is Status.OK
     assert run.trace.q[-1] == pytest.approx([0.4, 0.8 + 0.3, 0.7 - 0.3])
 
 
 def test_a_motion_without_bounds_is_ended() -> None:
     """A target 200 m away is no task error that a law can be judged by."""
-    scenario = _scenario()
+    scenario = planar_scenario()
     far = pin.SE3(np.eye(3), np.array([200.0, 0.0, 0.0]))
-    run = _run(_exact, replace(scenario, reference=target_at_rest(far, 0.3)))
+    run = run_on_planar(exact, replace(scenario, reference=target_at_rest(far, 0.3)))
     assert run.status is Status.DIVERGED
     assert run.message == "step 0: task error above 100 m, rad"
     assert run.trace.steps == 0
 
 
 @pytest.mark.parametrize(
-    "jump", [1, ERROR_CHECK_PERIOD - 1, ERROR_CHECK_PERIOD, ERROR_CHECK_PERIOD + 1]
+    "jump",
+    [1, ERROR_CHECK_PERIOD_STEPS - 1, ERROR_CHECK_PERIOD_STEPS, ERROR_CHECK_PERIOD_STEPS + 1],
 )
 def test_a_target_that_runs_away_ends_a_run_at_the_next_look(jump: int) -> None:
     """The task error is looked at in one step out of so many, and then ends the run."""
-    scenario = _scenario()
+    scenario = planar_scenario()
     far = pin.SE3(np.eye(3), np.array([200.0, 0.0, 0.0]))
     away = target_at_rest(far, 0.3)
     near = scenario.reference.placement
@@ -165,8 +103,12 @@ def test_a_target_that_runs_away_ends_a_run_at_the_next_look(jump: int) -> None:
         return (away.placement if tau > (jump - 0.5) * scenario.dt else near)(tau)
 
     reference = replace(scenario.reference, placement=placement)
-    run = _run(lambda problem: np.zeros(3), replace(scenario, reference=reference))
-    step = ERROR_CHECK_PERIOD if jump <= ERROR_CHECK_PERIOD else 2 * ERROR_CHECK_PERIOD
+    run = run_on_planar(lambda problem: np.zeros(3), replace(scenario, reference=reference))
+    step = (
+        ERROR_CHECK_PERIOD_STEPS
+        if jump <= ERROR_CHECK_PERIOD_STEPS
+        else 2 * ERROR_CHECK_PERIOD_STEPS
+    )
     if step < 30:
         assert run.status is Status.DIVERGED
         assert run.message == f"step {step}: task error above 100 m, rad"
@@ -186,7 +128,7 @@ def test_a_law_without_an_answer_gets_the_fallback_and_goes_on(
     error: Exception, status: Status
 ) -> None:
     """One step with that status, in which the robot stops; the trial is ok."""
-    run = _run(_at_step(7, lambda: _raise(error)))
+    run = run_on_planar(at_step(7, lambda: raises(error)))
     assert (run.status, run.message) == (Status.OK, "")
     assert run.trace.steps == 30
     assert np.flatnonzero(run.trace.status == STEP_CODE[status]).tolist() == [7]
@@ -202,7 +144,7 @@ def test_a_law_that_solves_without_saying_so_is_told() -> None:
         def velocity(self, problem: DikProblem, solve: Solve) -> Array:
             return solve(QuadraticProgram(np.eye(3), np.zeros(3)))
 
-    run = _run(Silent())
+    run = run_on_planar(Silent())
     assert run.status is Status.FORMULATION_ERROR
     assert "set program = 'qp' or 'lp'" in run.message
 
@@ -216,7 +158,7 @@ class _Projection:
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
         box = problem.box()
-        return solve(QuadraticProgram(np.eye(3), -_exact(problem), lb=box.lower, ub=box.upper))
+        return solve(QuadraticProgram(np.eye(3), -exact(problem), lb=box.lower, ub=box.upper))
 
 
 class _Liar:
@@ -236,7 +178,7 @@ class _Liar:
 
 def test_a_lying_solver_is_caught_and_its_answer_applied() -> None:
     """`not-verified` at that step alone; its residual is in the trace, in rad/s."""
-    run = _run(_Projection(), solve=CheckedSolve(_Liar()))
+    run = run_on_planar(_Projection(), solve=CheckedSolve(_Liar()))
     assert run.status is Status.OK
     assert np.flatnonzero(run.trace.status).tolist() == [5]
     assert run.trace.status[5] == STEP_CODE[Status.NOT_VERIFIED]
@@ -262,16 +204,20 @@ class _Impossible:
 @pytest.mark.parametrize("solver", ["daqp", "piqp", "proxqp"])
 def test_an_infeasible_program_is_a_status_of_its_steps(solver: str) -> None:
     """Said by the solver: infeasible. Claimed solved by it: not verified. Nothing else."""
-    run = _run(_Impossible(), solve=make_solve(parse_solver(solver), "qp"))
+    run = run_on_planar(_Impossible(), solve=make_solve(parse_solver(solver), "qp"))
     assert run.status is Status.OK
     caught = run.trace.share(Status.INFEASIBLE) + run.trace.share(Status.NOT_VERIFIED)
     assert caught == pytest.approx(1.0)
 
 
+def _a_share(share: float, problem: DikProblem) -> Array:
+    return share * exact(problem)
+
+
 def test_steps_that_go_nowhere_are_stuck() -> None:
     """Less than 1 % of the wanted motion; a hundredth and a bit is not."""
     for share, stuck in ((0.0099, 1.0), (0.0101, 0.0), (-0.5, 1.0)):
-        run = _run(lambda problem, share=share: share * _exact(problem))
+        run = run_on_planar(partial(_a_share, share))
         assert run.trace.share(Status.STUCK) == stuck
 
 
@@ -280,7 +226,7 @@ def test_steps_that_go_nowhere_are_stuck() -> None:
 
 def _problem(v_prev: Array | None, **limits: Any) -> DikProblem:
     robot = load_robot("planar3r").with_limits(**limits)
-    return DikProblem(robot, robot.q0, v_prev, 0.01, [], robot.limits.at(robot.q0))
+    return problem_at(robot, robot.q0, [], v_prev)
 
 
 @settings(deadline=None)
@@ -343,8 +289,10 @@ def test_the_fallback_keeps_rows_that_going_on_would_keep(
 
 def test_the_fallback_brings_a_robot_to_rest() -> None:
     """A law that never answers: the slowest joint's limit sets the pace, the path is straight."""
-    scenario = _scenario(acceleration=[1.0, 30.0, 30.0])
-    run = _run(lambda problem: _raise(Infeasible("never")), replace(scenario, duration=0.6))
+    scenario = planar_scenario(acceleration=[1.0, 30.0, 30.0])
+    run = run_on_planar(
+        lambda problem: raises(Infeasible("never")), replace(scenario, duration=0.6)
+    )
     speeds = run.trace.applied[:, 0]
     assert speeds == pytest.approx(np.maximum(0.5 - 0.01 * np.arange(1, 61), 0.0), abs=1e-12)
     assert run.trace.applied == pytest.approx(np.outer(speeds / 0.5, RATE), abs=1e-12)

@@ -7,8 +7,11 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from makers.scenarios import run_on_planar
 
 from dikbench.arrays import Array
+from dikbench.metrics import evaluate, motion_of
+from dikbench.plugins.building import make_formulation, make_scenario
 from dikbench.problem.tasks import PositionTask
 from dikbench.robots.catalogue import load_robot
 from dikbench.scenario import Reference, Scenario
@@ -72,7 +75,7 @@ def ratio(case: Scenario, share: float, ahead: float = 0.0) -> float:
     clock, x, steps = PathClock(case), 0.0, 0
     most = share * SPEED * case.dt * (1 + 1e-12)
     way = case.reference.placement
-    while not clock.is_over:
+    for _ in clock:
         goal = way(min(clock.tau + case.dt, case.reference.duration)).translation[0]
         x += min(max(goal - x, -most), most)
         clock.advance(at(x + ahead))
@@ -104,7 +107,7 @@ def test_a_robot_that_stands_still_is_given_up(cap: float) -> None:
     """After the scenario's own number of nominal durations, a control period on its way."""
     case = scenario(line, cap=cap)
     clock, steps = PathClock(case), 0
-    while not clock.is_over:
+    for _ in clock:
         clock.advance(at(0.0))
         steps += 1
     assert steps == clock.most_steps == round(cap * 400)
@@ -121,3 +124,10 @@ def test_the_clock_never_goes_back_nor_faster_than_time(seed: int, way: object) 
         before = clock.tau
         clock.advance(at(*random.uniform(-1, 1, 2)))
         assert before <= clock.tau <= min(before + case.dt + 1e-12, case.reference.duration)
+
+
+def test_a_law_with_a_gain_below_1_does_not_creep_into_the_ends() -> None:
+    """Of the minimum-jerk motions of `pick-and-place`: within 1.3 of the nominal duration."""
+    scenario = make_scenario("pick-and-place")
+    run = run_on_planar(make_formulation("dls[damping=0.05]"), scenario, mode="path")
+    assert evaluate(motion_of(run.trace, scenario))["slow_down"] < 1.3

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from makers.problems import with_limits_in_force
 
-from dikbench import DikAnswer, Robot, Status, load_robot, solve_dik
+from dikbench import DikAnswer, Robot, Status, solve_dik
 
 PEERS = Path(__file__).parents[2] / "data" / "peers"
 LAW = "lp-alpha[regularization=0,braking=one-step]"
@@ -42,12 +43,7 @@ def answer(case: str, robot: Robot, solver: str) -> DikAnswer:
 
 def limited(case: str, in_force: str) -> Robot:
     """The robot of a case with position limits (q), velocity limits (v), both or none in force."""
-    robot = load_robot(CASES[case]["robot"])
-    if "q" not in in_force:
-        robot = robot.with_limits(position=None)
-    if "v" not in in_force:
-        robot = robot.with_limits(velocity=None)
-    return robot
+    return with_limits_in_force(CASES[case]["robot"], in_force)
 
 
 def drake_limits(record: dict[str, Any]) -> str:

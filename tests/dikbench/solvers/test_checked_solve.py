@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from makers.programs import LIBRARIES_WARN, no_point, scaling
 
-from dikbench.arrays import Array
 from dikbench.errors import CannotAnswer, DikbenchError, Infeasible, SolverFailed
 from dikbench.programs.answer import Answer
 from dikbench.programs.quadratic_program import QuadraticProgram
@@ -18,34 +18,12 @@ from dikbench.solvers.catalogue.back_ends import parse_solver
 from dikbench.solvers.catalogue.presets import TOLERANCES
 from dikbench.solvers.checked_solve import CheckedSolve, NoSolve, make_solve
 from dikbench.solvers.interfaces.cold import ColdSolver
-from dikbench.solvers.recheck.optimum import JUDGE, PROVEN, distance_to_optimum
+from dikbench.solvers.recheck.optimum import JUDGE_SOLVER, PROVEN_DISTANCE, distance_to_optimum
 from dikbench.solvers.recheck.rechecked import RecheckedSteps
 from dikbench.solvers.recheck.residuals import residuals
 from dikbench.solvers.recheck.stack import Stack
 
-# The libraries warn beside each failure; `dikbench.solvers` silences them, pytest resets that.
-pytestmark = [
-    pytest.mark.filterwarnings(r"ignore::UserWarning:qpsolvers\."),
-    pytest.mark.filterwarnings(r"ignore::UserWarning:cvxpy\.|dikbench\.solvers\.modelled"),
-]
-
-
-def _scaling() -> tuple[QuadraticProgram, Array]:
-    """The shape of alpha scaling: max alpha, v = alpha (1, 4), |v| <= 2: alpha = 1/2."""
-    A = np.array([[1.0, 0.0, -1.0], [0.0, 1.0, -4.0]])
-    bounds = {"lb": np.array([-2.0, -2.0, 0.0]), "ub": np.array([2.0, 2.0, 1.0])}
-    program = QuadraticProgram(
-        np.zeros((3, 3)), np.array([0.0, 0.0, -1.0]), A=A, b=np.zeros(2), **bounds
-    )
-    return program, np.array([0.5, 2.0, 0.5])
-
-
-def _no_point() -> QuadraticProgram:
-    """x_1 + x_2 = 3 with |x_i| <= 1."""
-    A = np.array([[1.0, 1.0]])
-    return QuadraticProgram(
-        np.eye(2), np.zeros(2), A=A, b=np.array([3.0]), lb=-np.ones(2), ub=np.ones(2)
-    )
+pytestmark = LIBRARIES_WARN
 
 
 def _one_bound() -> QuadraticProgram:
@@ -152,7 +130,7 @@ def _judged(program: QuadraticProgram, answer: Answer) -> float:
 
 def test_the_distance_of_an_alpha_scaling_is_in_alpha() -> None:
     """Four fifths of the best alpha is 0.1 of 0.5 away, however far the velocities are."""
-    program, x = _scaling()
+    program, x = scaling()
     for share, distance in ((1.0, 0.0), (0.8, 0.1)):
         answer = Answer(share * x, True)
         assert _judged(program, answer) == pytest.approx(distance, abs=1e-6)
@@ -160,13 +138,13 @@ def test_the_distance_of_an_alpha_scaling_is_in_alpha() -> None:
 
 def test_without_a_judge_the_distance_is_not_known() -> None:
     """A program without a feasible point has no optimum to be far from."""
-    assert math.isnan(_judged(_no_point(), Answer(np.ones(2), True)))
+    assert math.isnan(_judged(no_point(), Answer(np.ones(2), True)))
 
 
 def test_the_judge_is_asked_where_nothing_is_proven() -> None:
     """A small bound is taken for the distance; a large one, however wrong, is replaced by it."""
     program, answer = _one_bound(), _said(0.75)
-    bounds = np.array([0.0, 0.5 * PROVEN, 2 * PROVEN, 7.0, np.inf, np.nan])
+    bounds = np.array([0.0, 0.5 * PROVEN_DISTANCE, 2 * PROVEN_DISTANCE, 7.0, np.inf, np.nan])
     found = distance_to_optimum([program] * 6, [answer] * 6, bounds)
     assert found[:2].tolist() == bounds[:2].tolist()
     assert found[2:] == pytest.approx(0.25)
@@ -191,7 +169,7 @@ def test_an_answer_that_is_not_claimed_is_not_handed_out() -> None:
     assert solve.checking_ns > 0
     solve.begin_step(1)
     with pytest.raises(Infeasible, match="no feasible point"):
-        solve(_no_point())
+        solve(no_point())
     assert solve.calls == 1
     assert solve.checking_ns > 0
     found = solve.rechecked()
@@ -249,7 +227,7 @@ def test_a_step_takes_the_worst_of_its_answers(
     monkeypatch: pytest.MonkeyPatch, turn: int, batch: int
 ) -> None:
     """Claimed if all are, verified if all are, the largest residual of each kind; in any order."""
-    monkeypatch.setattr(checked_solve, "BATCH", batch)
+    monkeypatch.setattr(checked_solve, "ANSWERS_PER_RECHECK", batch)
     answers = [
         (_one_bound(), _said(1.0, 1.0)),
         (_one_bound(), _said(0.5, 1.5)),  # gap 0.75, distance 0.5
@@ -296,7 +274,7 @@ def _program(random: np.random.Generator, n: int, kind: int) -> QuadraticProgram
 def _run(seed: int, steps: int = 25) -> RecheckedSteps:
     """What is found on a run of up to four answers per step: right, wrong, none, unexplained."""
     random = np.random.default_rng(seed)
-    exact = ColdSolver(JUDGE)
+    exact = ColdSolver(JUDGE_SOLVER)
     script = _Script()
     solve = CheckedSolve(script, tolerance=1e-6)
     solve.begin_run(steps)
@@ -330,7 +308,7 @@ def test_what_is_found_does_not_depend_on_when_it_is_looked_for(
     """Step by step, in small batches, or all at the end; but for the part of proven distances."""
     found = {}
     for batch in (1, 3, 512):
-        monkeypatch.setattr(checked_solve, "BATCH", batch)
+        monkeypatch.setattr(checked_solve, "ANSWERS_PER_RECHECK", batch)
         found[batch] = _run(seed)
     last = found[512]
     assert {-1, 0, 1} == set(last.claimed.tolist()) == set(last.verified.tolist())
@@ -343,7 +321,7 @@ def test_what_is_found_does_not_depend_on_when_it_is_looked_for(
             np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-13, equal_nan=True)
         # A bound that is proof enough stands for the distance, and is that of its batch.
         np.testing.assert_allclose(
-            found[batch].distance, last.distance, rtol=1e-9, atol=PROVEN, equal_nan=True
+            found[batch].distance, last.distance, rtol=1e-9, atol=PROVEN_DISTANCE, equal_nan=True
         )
 
 
@@ -355,7 +333,7 @@ def test_the_recheck_keeps_to_its_batches(monkeypatch: pytest.MonkeyPatch) -> No
         waiting.append(len(solved))
 
     monkeypatch.setattr(RecheckedSteps, "recheck", note)
-    monkeypatch.setattr(checked_solve, "BATCH", 3)
+    monkeypatch.setattr(checked_solve, "ANSWERS_PER_RECHECK", 3)
     solve = CheckedSolve(_Script(*(_said(1.0, 1.0) for _ in range(10))))
     solve.begin_run(5)
     for step in range(5):
@@ -371,7 +349,7 @@ def test_without_checks_nothing_is_kept() -> None:
     solve = CheckedSolve(_Script(_said(7.0, 0.0), Answer(None, False)), checks=False)
     assert solve(_one_bound()) == pytest.approx([7.0])
     with pytest.raises(SolverFailed):
-        solve(_no_point())
+        solve(no_point())
     found = solve.rechecked()
     assert (found.claimed.tolist(), found.verified.tolist()) == ([-1], [-1])
 

@@ -7,28 +7,30 @@ from collections.abc import Callable
 import cvxpy
 import numpy as np
 import pytest
+from makers.programs import (
+    ACCURACY,
+    INSTALLED,
+    LIBRARIES_WARN,
+    mixture,
+    no_point,
+    projection,
+    scaling,
+    solve_with,
+)
 
 from dikbench.arrays import Array
 from dikbench.errors import Infeasible, SolverFailed
 from dikbench.programs.modelled_program import ModelledProgram
-from dikbench.programs.quadratic_program import ProgramKind, QuadraticProgram
+from dikbench.programs.quadratic_program import QuadraticProgram
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
 from dikbench.solvers.catalogue.back_ends import (
     BACK_ENDS,
-    is_installed,
-    parse_solver,
 )
-from dikbench.solvers.checked_solve import CheckedSolve, make_solve
 from dikbench.solvers.recheck.feasibility import is_feasible
 
-# The libraries warn beside each failure; `dikbench.solvers` silences them, pytest resets that.
-pytestmark = [
-    pytest.mark.filterwarnings(r"ignore::UserWarning:qpsolvers\."),
-    pytest.mark.filterwarnings(r"ignore::UserWarning:cvxpy\.|dikbench\.solvers\.modelled"),
-]
+pytestmark = LIBRARIES_WARN
 
-INSTALLED = [name for name in BACK_ENDS if is_installed(name)]
 CALLS = [f"{name}[interface={i}]" for name in INSTALLED for i in BACK_ENDS[name].interfaces]
 LINEAR = [
     f"{name}[interface={i}]"
@@ -37,19 +39,6 @@ LINEAR = [
     for i in BACK_ENDS[name].interfaces
 ]
 MODELLED = [name for name in INSTALLED if "cvxpy" in BACK_ENDS[name].interfaces]
-
-ACCURACY = 5e-3
-"""The loosest default tolerance (OSQP's 1e-3), with room for the conditioning of the examples."""
-
-
-def _solve(selector: str, program: ProgramKind = "qp") -> CheckedSolve:
-    return make_solve(parse_solver(selector), program)
-
-
-def _projection() -> tuple[QuadraticProgram, Array]:
-    """The point of the box [0, 1]^3 that is nearest to c: c clipped."""
-    c = np.array([0.5, 2.0, -3.0])
-    return QuadraticProgram(np.eye(3), -c, lb=np.zeros(3), ub=np.ones(3)), np.clip(c, 0, 1)
 
 
 def _equality() -> tuple[QuadraticProgram, Array]:
@@ -73,44 +62,12 @@ def _half_space() -> tuple[QuadraticProgram, Array]:
     return QuadraticProgram(np.eye(3), -c, G=n[None], h=np.array([h]), lb=lower, ub=upper), x
 
 
-def _mixture() -> tuple[QuadraticProgram, Array]:
-    """Everything at once, the optimum put together from its multipliers.
-
-    x = (1, 0, 0.5): the upper bound of x_1 active (multiplier 2), the lower one of x_2 (-3), the
-    inequality x_1 + x_3 <= 1.5 active (0.5) and x_1 + x_2 - x_3 = 0.5 (-1), so that
-    q = -(P x + G'z + A'y + w).
-    """
-    P, x = np.diag([1.0, 2.0, 4.0]), np.array([1.0, 0.0, 0.5])
-    G, A = np.array([[1.0, 0.0, 1.0]]), np.array([[1.0, 1.0, -1.0]])
-    q = -(P @ x + G.T @ [0.5] + A.T @ [-1.0] + np.array([2.0, -3.0, 0.0]))
-    bounds = {"lb": np.array([-1.0, 0.0, -1.0]), "ub": np.array([1.0, 1.0, 1.0])}
-    return QuadraticProgram(P, q, G, np.array([1.5]), A, np.array([0.5]), **bounds), x
-
-
 def _linear() -> tuple[QuadraticProgram, Array]:
     """Max x_1 + 2 x_2 with x_1 + x_2 <= 3, 0 <= x_1, 0 <= x_2 <= 2: the vertex (1, 2)."""
     G, h = np.array([[1.0, 1.0]]), np.array([3.0])
     lower, upper = np.zeros(2), np.array([np.inf, 2.0])
     cost = np.array([-1.0, -2.0])
     return QuadraticProgram(np.zeros((2, 2)), cost, G, h, lb=lower, ub=upper), np.array([1.0, 2.0])
-
-
-def _scaling() -> tuple[QuadraticProgram, Array]:
-    """The shape of alpha scaling: max alpha, v = alpha (1, 4), |v| <= 2: alpha = 1/2."""
-    A = np.array([[1.0, 0.0, -1.0], [0.0, 1.0, -4.0]])
-    bounds = {"lb": np.array([-2.0, -2.0, 0.0]), "ub": np.array([2.0, 2.0, 1.0])}
-    program = QuadraticProgram(
-        np.zeros((3, 3)), np.array([0.0, 0.0, -1.0]), A=A, b=np.zeros(2), **bounds
-    )
-    return program, np.array([0.5, 2.0, 0.5])
-
-
-def _no_point() -> QuadraticProgram:
-    """x_1 + x_2 = 3 with |x_i| <= 1."""
-    A = np.array([[1.0, 1.0]])
-    return QuadraticProgram(
-        np.eye(2), np.zeros(2), A=A, b=np.array([3.0]), lb=-np.ones(2), ub=np.ones(2)
-    )
 
 
 def _contradiction() -> QuadraticProgram:
@@ -122,26 +79,26 @@ def _contradiction() -> QuadraticProgram:
 # --- known programs through every interface
 
 
-@pytest.mark.parametrize("example", [_projection, _equality, _half_space, _mixture])
+@pytest.mark.parametrize("example", [projection, _equality, _half_space, mixture])
 @pytest.mark.parametrize("call", CALLS)
 def test_every_solver_solves_a_known_quadratic_program(
     call: str, example: Callable[[], tuple[QuadraticProgram, Array]]
 ) -> None:
     """Through each of its interfaces, with its own settings, to a verified answer."""
     program, x = example()
-    solve = _solve(call)
+    solve = solve_with(call)
     assert solve(program) == pytest.approx(x, abs=ACCURACY)
     assert solve.rechecked().verified.tolist() == [1]
 
 
-@pytest.mark.parametrize("example", [_linear, _scaling])
+@pytest.mark.parametrize("example", [_linear, scaling])
 @pytest.mark.parametrize("call", LINEAR)
 def test_every_solver_that_claims_so_solves_a_known_linear_program(
     call: str, example: Callable[[], tuple[QuadraticProgram, Array]]
 ) -> None:
     """P = 0 and the optimum at a vertex."""
     program, x = example()
-    assert _solve(call, "lp")(program) == pytest.approx(x, abs=ACCURACY)
+    assert solve_with(call, "lp")(program) == pytest.approx(x, abs=ACCURACY)
 
 
 @pytest.mark.parametrize("name", MODELLED)
@@ -150,8 +107,8 @@ def test_a_program_in_modelling_words_gives_its_unknowns_stacked(name: str) -> N
     v, alpha = cvxpy.Variable(2), cvxpy.Variable()
     limits = [v >= -2, v <= 2, alpha >= 0, alpha <= 1]
     model = cvxpy.Problem(cvxpy.Maximize(alpha), [v == alpha * np.array([1.0, 4.0]), *limits])
-    program, x = _scaling()
-    solve = _solve(name, "cvxpy")
+    program, x = scaling()
+    solve = solve_with(name, "cvxpy")
     answer = solve(ModelledProgram(model, (v, alpha), lambda: program))
     assert answer == pytest.approx(x, abs=ACCURACY)
     assert solve.rechecked().verified.tolist() == [1]
@@ -161,28 +118,28 @@ def test_a_program_in_modelling_words_gives_its_unknowns_stacked(name: str) -> N
 @pytest.mark.parametrize("call", CALLS)
 def test_the_program_is_not_changed_by_solving_it(call: str) -> None:
     """Solvers get the law's own arrays: they must be left as they were."""
-    program, _ = _mixture()
-    before = {part: getattr(program, part).copy() for part in program.__slots__}
-    _solve(call)(program)
+    program, _ = mixture()
+    before = {part: getattr(program, part).copy() for part in program.__struct_fields__}
+    solve_with(call)(program)
     for part, value in before.items():
         assert np.array_equal(getattr(program, part), value), part
 
 
-@pytest.mark.parametrize("part", QuadraticProgram.__slots__)
+@pytest.mark.parametrize("part", QuadraticProgram.__struct_fields__)
 @pytest.mark.parametrize("call", CALLS)
 def test_a_program_may_be_read_only(call: str, part: str) -> None:
     """Some arrays are shared between steps, and nobody can write to them."""
-    program, x = _mixture()
+    program, x = mixture()
     getattr(program, part).flags.writeable = False
-    assert _solve(call)(program) == pytest.approx(x, abs=ACCURACY)
+    assert solve_with(call)(program) == pytest.approx(x, abs=ACCURACY)
 
 
 @pytest.mark.parametrize("call", CALLS)
 def test_an_answer_does_not_depend_on_what_was_solved_before(call: str) -> None:
     """The same program gives the same bits after another one of the same shape."""
-    program, _ = _projection()
+    program, _ = projection()
     other = QuadraticProgram(np.eye(3), np.array([9.0, -9.0, 0.1]), lb=program.lb, ub=program.ub)
-    solve = _solve(call)
+    solve = solve_with(call)
     first = solve(program).copy()
     solve(other)
     assert np.array_equal(solve(program), first)
@@ -195,13 +152,13 @@ def test_an_answer_does_not_depend_on_what_was_solved_before(call: str) -> None:
 def test_a_program_without_a_feasible_point_is_infeasible(call: str) -> None:
     """Bounds against an equality: every solver sees it, and the judge agrees."""
     with pytest.raises(Infeasible):
-        _solve(call)(_no_point())
+        solve_with(call)(no_point())
 
 
 @pytest.mark.parametrize("call", CALLS)
 def test_an_inconsistent_equality_is_never_verified(call: str) -> None:
     """Whatever a solver makes of x = 0 and x = 1: infeasible, or claimed and caught."""
-    solve = _solve(call)
+    solve = solve_with(call)
     try:
         solve(_contradiction())
     except Infeasible:
@@ -233,9 +190,9 @@ LIMIT_OF_ITERATIONS = {
 )
 def test_a_solver_that_gives_up_on_a_feasible_program_has_failed(call: str) -> None:
     """One iteration is not enough for a projection onto a box: SolverFailed, not Infeasible."""
-    program, _ = _projection()
+    program, _ = projection()
     with pytest.raises(SolverFailed):
-        _solve(call)(program)
+        solve_with(call)(program)
 
 
 @pytest.mark.parametrize("direction", [0, 1, 2, 3, 4])
@@ -252,7 +209,7 @@ def test_the_exact_wrist_singularity_is_never_verified(call: str, direction: int
     bound = np.full(6, 3.0)
     program = QuadraticProgram(1e-6 * np.eye(6), np.zeros(6), A=J, b=V, lb=-bound, ub=bound)
     assert not is_feasible(program)
-    solve = _solve(call)
+    solve = solve_with(call)
     try:
         solve(program)
     except Infeasible:
@@ -271,11 +228,11 @@ def test_the_judge_of_feasibility() -> None:
     assert is_feasible(QuadraticProgram(P, q))
     assert is_feasible(QuadraticProgram(P, q, lb=ones, ub=ones))
     assert is_feasible(QuadraticProgram(P, q, G=-row, h=np.array([-5.0])))
-    for example in (_projection, _equality, _half_space, _mixture, _linear, _scaling):
+    for example in (projection, _equality, _half_space, mixture, _linear, scaling):
         assert is_feasible(example()[0])
     assert not is_feasible(QuadraticProgram(P, q, lb=ones, ub=-ones))
     assert not is_feasible(QuadraticProgram(P, q, G=row, h=np.array([-3.0]), lb=-ones, ub=ones))
-    assert not is_feasible(_no_point())
+    assert not is_feasible(no_point())
     assert not is_feasible(_contradiction())
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from makers.programs import LIBRARIES_WARN
 
 from dikbench.arrays import Array
 from dikbench.errors import CannotAnswer
@@ -15,10 +16,7 @@ from dikbench.solvers.catalogue.back_ends import parse_solver
 from dikbench.solvers.checked_solve import CheckedSolve, make_solve
 from dikbench.study.study import load_study
 
-pytestmark = [
-    pytest.mark.long,
-    pytest.mark.filterwarnings(r"ignore::UserWarning:qpsolvers\."),
-]
+pytestmark = LIBRARIES_WARN
 
 DAMPING = 1e-3
 """Of `qp`, lambda."""

@@ -30,7 +30,7 @@ def test_the_shipped_studies_share_no_seed_and_no_scenario() -> None:
     assert (train.split, test.split) == ("train", "test")
     assert set(train.seeds) <= set(SPLITS["train"])
     assert set(test.seeds) <= set(SPLITS["test"])
-    ids = [{scenario_id(text) for text in study.scenarios} for study in (train, test)]
+    ids = [{scenario_id(parse_selector(t)) for t in s.scenarios} for s in (train, test)]
     assert not ids[0] & ids[1]
     families = [{parse_selector(t).name for t in s.scenarios} for s in (train, test)]
     assert families[0] == families[1]
@@ -70,7 +70,7 @@ def test_a_scenario_of_the_other_split_is_an_error_however_it_is_spelt() -> None
     """Defaults that are spelt out do not hide it."""
     scenario = load_study("test").scenarios[0]
     spelt = f"{scenario[:-1]},gain=5.0]"
-    assert scenario_id(spelt) == scenario_id(scenario)
+    assert scenario_id(parse_selector(spelt)) == scenario_id(parse_selector(scenario))
     with pytest.raises(DikbenchError, match="belongs to the other split than train"):
         expand(_changed(scenarios=(spelt,)))
 

@@ -40,6 +40,8 @@ def test_distance_to_the_limit_is_as_labelled(place: str, margin: float) -> None
     assert chosen
     for state in chosen:
         limits = state.problem.limits
+        assert limits.to_lower is not None
+        assert limits.to_upper is not None
         nearest = np.minimum(limits.to_lower, limits.to_upper).min()
         assert nearest == pytest.approx(margin, abs=1e-12), state.label
 
@@ -50,6 +52,8 @@ def test_velocity_before_is_inside_the_velocity_limits() -> None:
     assert moving
     for problem in moving:
         interval = problem.limits.joint.velocity
+        assert problem.v_prev is not None
+        assert interval is not None
         assert np.all(problem.v_prev > interval.lower)
         assert np.all(problem.v_prev < interval.upper)
 

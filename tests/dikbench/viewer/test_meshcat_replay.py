@@ -63,8 +63,7 @@ def pages(runs: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str
 
 def sent(page: str) -> list[Any]:
     """The commands to the viewer that a page holds."""
-    import umsgpack
-
+    umsgpack = pytest.importorskip("umsgpack", reason=WITHOUT)
     return [
         umsgpack.unpackb(base64.b64decode(text))
         for text in re.findall(r'fetch\("data:application/octet-binary;base64,([^"]+)"\)', page)
@@ -90,14 +89,16 @@ def pose(node: dict[str, Any], key: int) -> Array:
     """The placement of a node at one of its keyframes, (4, 4)."""
     x, y, z, w = node[".quaternion"][key]["value"]
     rotation = pin.Quaternion(w, x, y, z).matrix()
-    return pin.SE3(rotation, np.array(node[".position"][key]["value"])).homogeneous
+    placement: Array = pin.SE3(rotation, np.array(node[".position"][key]["value"])).homogeneous
+    return placement
 
 
 def tip(robot: Robot, q: Array) -> Array:
     """Placement of the task frame, (4, 4)."""
     data = robot.model.createData()
     pin.framesForwardKinematics(robot.model, data, q)
-    return data.oMf[robot.frame_id].homogeneous
+    placement: Array = data.oMf[robot.frame_id].homogeneous
+    return placement
 
 
 @pytest.mark.parametrize("family", EVERY)
@@ -106,7 +107,7 @@ def test_a_page_needs_nothing_else(pages: dict[str, str], runs: Path, family: st
     page = pages[family]
     assert not re.search(r"""<(script|link|img)[^>]+(src|href)\s*=""", page)
     recording = recording_of(runs, family)
-    assert recording.trial.scenario in page
+    assert str(recording.trial.scenario) in page
     assert f"<title>{recording.id}</title>" in page
     assert "past a limit" in page
 

@@ -1,4 +1,4 @@
-"""Clarabel with a persistent solver: no start from the answer before, but no set-up either."""
+"""Clarabel with a persistent solver, which saves the set-up but not the start from scratch."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from dikbench.programs.quadratic_program import QuadraticProgram
 
 
 class ClarabelWorkspace:
-    """Clarabel's rows are those of A, those of G, finite upper bounds, finite lower ones."""
+    """A Clarabel solver; its rows are those of A, of G, finite upper and finite lower bounds."""
 
     def __init__(self, program: QuadraticProgram, settings: Mapping[str, Any]) -> None:
         n = len(program.q)
         self._settings = settings
-        below, beside = np.tril_indices(n)
-        self._triangle = below * n + beside
-        self._triangle_rows, self._triangle_starts = beside, np.cumsum([0, *range(1, n + 1)])
+        rows, columns = np.tril_indices(n)
+        self._triangle = rows * n + columns
+        self._triangle_rows, self._triangle_starts = columns, np.cumsum([0, *range(1, n + 1)])
         self._equalities = 0 if program.b is None else len(program.b)
         self._dense = self._equalities + (0 if program.h is None else len(program.h))
         self._solver: Any = None
@@ -58,7 +58,7 @@ class ClarabelWorkspace:
         self._of_dense = self._columns.indices < self._dense
         settings = clarabel.DefaultSettings()
         settings.verbose = False
-        settings.presolve_enable = False  # it may drop rows, and values are then not updated
+        settings.presolve_enable = False  # it may drop rows, whose values cannot be updated then
         for key, value in self._settings.items():
             setattr(settings, key, value)
         cones: list[Any] = []
@@ -73,7 +73,7 @@ class ClarabelWorkspace:
         self._solver = clarabel.DefaultSolver(P, program.q, A, b, cones, settings)
 
     def _values(self, program: QuadraticProgram) -> tuple[Array, Array, Array]:
-        """Values of P and A in the order of their patterns, and the right-hand side."""
+        """Return the values of P and A in the order of their patterns, and the right-hand side."""
         assert self._finite is not None
         inequalities, upper, lower = self._finite
         rows, sides = [], []
@@ -107,6 +107,6 @@ class ClarabelWorkspace:
 
 
 def _finite(bound: Array | None) -> Indices:
-    """Indices of the finite entries of a bound."""
+    """Return the indices of the finite entries of a bound."""
     none: Indices = np.empty(0, dtype=int)
     return none if bound is None else np.flatnonzero(np.isfinite(bound))

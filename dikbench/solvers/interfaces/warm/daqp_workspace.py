@@ -13,15 +13,14 @@ from dikbench.arrays import Array, plain
 from dikbench.programs.answer import Answer
 from dikbench.programs.quadratic_program import QuadraticProgram
 
-INFINITE: Final = 1e30
-"""daqp's own infinity."""
+DAQP_INFINITY: Final = 1e30
 
-EQUALITY: Final = 5
-"""daqp's flags of a row that is active and stays so."""
+EQUALITY_FLAGS: Final = 5
+"""daqp's flags of a row that is active and stays active."""
 
 
 class DaqpWorkspace:
-    """daqp's constraints are bounds on x, then the rows of G, then those of A."""
+    """A daqp model; its constraints are bounds on x, then the rows of G, then those of A."""
 
     def __init__(self, program: QuadraticProgram, settings: Mapping[str, Any]) -> None:
         n = len(program.q)
@@ -29,9 +28,9 @@ class DaqpWorkspace:
         self._first_equality = self._bounds + (0 if program.h is None else len(program.h))
         m = self._first_equality + (0 if program.b is None else len(program.b))
         self._rows = np.zeros((m - self._bounds, n))
-        self._upper, self._lower = np.full(m, INFINITE), np.full(m, -INFINITE)
+        self._upper, self._lower = np.full(m, DAQP_INFINITY), np.full(m, -DAQP_INFINITY)
         sense = np.zeros(m, dtype=np.int32)
-        sense[self._first_equality :] = EQUALITY
+        sense[self._first_equality :] = EQUALITY_FLAGS
         self._has_rows = len(self._rows) > 0
         self._model = daqp.Model()
         self._fill(program)
@@ -56,21 +55,22 @@ class DaqpWorkspace:
         start = perf_counter_ns()
         x, _, flag, info = model.solve()
         core_ns = perf_counter_ns() - start
-        pushes = info["lam"]
+        multipliers = info["lam"]
         if self._has_rows:
             i, j = self._bounds, self._first_equality
-            return Answer(x, flag > 0, pushes[j:], pushes[i:j], pushes[:i], core_ns)
-        return Answer(x, flag > 0, None, None, pushes, core_ns)
+            y, z, z_box = multipliers[j:], multipliers[i:j], multipliers[:i]
+            return Answer(x, flag > 0, y, z, z_box, core_ns)
+        return Answer(x, flag > 0, None, None, multipliers, core_ns)
 
     def _fill(self, program: QuadraticProgram) -> None:
         self._last_upper, self._last_lower = program.ub, program.lb
         i, j = self._bounds, self._first_equality
         if program.ub is not None:
-            np.minimum(program.ub, INFINITE, out=self._upper[:i])
+            np.minimum(program.ub, DAQP_INFINITY, out=self._upper[:i])
         if program.lb is not None:
-            np.maximum(program.lb, -INFINITE, out=self._lower[:i])
+            np.maximum(program.lb, -DAQP_INFINITY, out=self._lower[:i])
         if program.G is not None and program.h is not None:
-            np.minimum(program.h, INFINITE, out=self._upper[i:j])
+            np.minimum(program.h, DAQP_INFINITY, out=self._upper[i:j])
             self._rows[: j - i] = program.G
         if program.A is not None:
             self._upper[j:] = program.b
@@ -79,7 +79,7 @@ class DaqpWorkspace:
 
 
 def _is_fixed(upper: Array | None, lower: Array | None) -> bool:
-    """Whether bounds cannot have changed: away from limits each step has the same, read-only."""
+    """Say whether bounds are read-only, so that the same arrays hold the same values."""
     return (upper is None or not upper.flags.writeable) and (
         lower is None or not lower.flags.writeable
     )

@@ -1,4 +1,4 @@
-"""HiGHS with a persistent object: a linear program starts from the basis of the one before."""
+"""HiGHS with a persistent object; a linear program starts from the previous basis."""
 
 from __future__ import annotations
 
@@ -15,12 +15,13 @@ from dikbench.programs.quadratic_program import QuadraticProgram
 COLUMN_WISE: Final = 1
 TRIANGULAR: Final = 1
 MINIMIZE: Final = 1
+"""HiGHS' codes of a matrix format, a Hessian format and an objective sense."""
 
 
 class HighsWorkspace:
-    """HiGHS' rows are those of G, then those of A; a vacuous one where there is none.
+    """A HiGHS object; its rows are those of G, then those of A, or one that constrains nothing.
 
-    (HiGHS 1.15 calls wrong points optimal where a quadratic program has bounds only.)
+    HiGHS 1.15 calls wrong points optimal where a quadratic program has bounds only.
     """
 
     def __init__(self, program: QuadraticProgram, settings: Mapping[str, Any]) -> None:
@@ -33,9 +34,9 @@ class HighsWorkspace:
         self._starts = np.arange(n, dtype=np.int32) * m
         self._indices = np.tile(np.arange(m, dtype=np.int32), n)
         # The lower triangle column by column.
-        beside, below = np.triu_indices(n)
-        self._triangle = below * n + beside
-        self._triangle_rows = below.astype(np.int32)
+        columns, rows = np.triu_indices(n)
+        self._triangle = rows * n + columns
+        self._triangle_rows = rows.astype(np.int32)
         self._triangle_starts = np.cumsum([0, *range(n, 1, -1)]).astype(np.int32)
         self._no_bound = np.full(n, np.inf)
         self._continuous = np.zeros(n, dtype=np.int32)
@@ -75,12 +76,12 @@ class HighsWorkspace:
         if linear:
             self._basis = solver.getBasis()
         solution = solver.getSolution()
-        push = -np.array(solution.row_dual)
+        multipliers = -np.array(solution.row_dual)
         return Answer(
             np.array(solution.col_value),
             claimed,
-            push[i : self._rows],
-            push[:i],
+            multipliers[i : self._rows],
+            multipliers[:i],
             -np.array(solution.col_dual),
             core_ns,
         )

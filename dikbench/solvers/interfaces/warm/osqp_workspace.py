@@ -1,4 +1,4 @@
-"""OSQP with a persistent workspace: the sparsity is that of dense matrices, once and for all."""
+"""OSQP with a persistent workspace, whose sparsity pattern is that of dense matrices."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dikbench.programs.quadratic_program import QuadraticProgram
 
 
 class OsqpWorkspace:
-    """OSQP's rows are those of G, then those of A, then one for each bounded x."""
+    """An OSQP workspace; its rows are those of G, then those of A, then one for each bounded x."""
 
     def __init__(self, program: QuadraticProgram, settings: Mapping[str, Any]) -> None:
         n = len(program.q)
@@ -26,9 +26,9 @@ class OsqpWorkspace:
         m = self._dense + (n if bounded else 0)
         self._upper, self._lower = np.full(m, np.inf), np.full(m, -np.inf)
         # The upper triangle column by column is, P being symmetric, the lower one row by row.
-        below, beside = np.tril_indices(n)
-        self._triangle = below * n + beside
-        self._triangle_rows, self._triangle_starts = beside, np.cumsum([0, *range(1, n + 1)])
+        rows, columns = np.tril_indices(n)
+        self._triangle = rows * n + columns
+        self._triangle_rows, self._triangle_starts = columns, np.cumsum([0, *range(1, n + 1)])
         # Column j holds the dense rows and, where x is bounded, a 1.
         self._values = np.ones((n, self._dense + bounded))
         own = np.arange(self._dense, m).reshape(-1, 1) if bounded else np.empty((n, 0), dtype=int)
@@ -53,7 +53,7 @@ class OsqpWorkspace:
             self._upper[j:] = program.ub
         if program.lb is not None:
             self._lower[j:] = program.lb
-        if (self._lower > self._upper).any():  # OSQP would go on with the bounds before
+        if (self._lower > self._upper).any():  # OSQP would keep the previous bounds
             return Answer(None, claimed=False)
         P_values, q = program.P.ravel()[self._triangle], plain(program.q)
         if self._solver is None:
@@ -68,8 +68,9 @@ class OsqpWorkspace:
         result = self._solver.solve(raise_error=False)
         core_ns = perf_counter_ns() - start
         claimed = result.info.status_val == osqp.SolverStatus.OSQP_SOLVED
-        push = np.array(result.y)
-        return Answer(np.array(result.x), claimed, push[i:j], push[:i], push[j:], core_ns)
+        multipliers = np.array(result.y)
+        y, z, z_box = multipliers[i:j], multipliers[:i], multipliers[j:]
+        return Answer(np.array(result.x), claimed, y, z, z_box, core_ns)
 
     def _set_up(self, program: QuadraticProgram, P_values: Any) -> None:
         n = len(program.q)

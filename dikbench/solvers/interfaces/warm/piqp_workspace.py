@@ -1,4 +1,4 @@
-"""PIQP with a persistent dense solver: an interior point method, so every solve starts afresh."""
+"""PIQP with a persistent dense solver: an interior point method without warm start."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class PiqpWorkspace:
 
     def solve(self, program: QuadraticProgram) -> Answer:
         """See `Workspace`."""
-        # A row with an infinite side is dropped for good when it is set up.
+        # PIQP drops a row with an infinite side permanently at its set-up.
         lasting = program.h is None or bool(np.isfinite(program.h).all())
         if self._solver is None or not lasting:
             solver = self._new()
@@ -31,7 +31,7 @@ class PiqpWorkspace:
             solver = self._solver
             take = solver.update
         self._solver = solver if lasting else None
-        # It wants columns: the transpose of a symmetric matrix is that without a copy.
+        # PIQP reads columns: the transpose of a symmetric matrix has them without a copy.
         take(
             program.P.T, program.q, program.A, program.b, program.G, None, program.h,
             program.lb, program.ub,

@@ -24,7 +24,7 @@ class ProxqpWorkspace:
         self._none = np.full(n, np.inf)
         self._below = np.full(self._inequalities, -np.inf)
         self._solver = proxqp.dense.QP(n, m, self._inequalities, self._bounded)
-        # The first solve has nothing to start from; it takes zeros for an answer now and then.
+        # Without this guess the first solve at times takes zeros for an answer.
         self._solver.settings.initial_guess = proxqp.InitialGuess.EQUALITY_CONSTRAINED_INITIAL_GUESS
         for key, value in settings.items():
             setattr(self._solver.settings, key, value)
@@ -54,12 +54,12 @@ class ProxqpWorkspace:
             self._is_set_up = True
             solver.settings.initial_guess = proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
         results = solver.results
-        push = results.z.copy()
+        multipliers = results.z.copy()
         return Answer(
             results.x.copy(),
             results.info.status == proxqp.QPSolverOutput.PROXQP_SOLVED,
             results.y.copy(),
-            push[: self._inequalities],
-            push[self._inequalities :],
+            multipliers[: self._inequalities],
+            multipliers[self._inequalities :],
             core_ns,
         )

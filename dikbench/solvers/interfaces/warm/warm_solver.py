@@ -1,4 +1,4 @@
-"""A back end that keeps its workspaces through a trial."""
+"""A back end that keeps its workspaces during a trial."""
 
 from __future__ import annotations
 
@@ -18,18 +18,15 @@ WORKSPACES: Final = {
     "daqp": "DaqpWorkspace",
     "highs": "HighsWorkspace",
 }
-"""The class of each back end, in the file of the back end's name."""
+"""The class of each back end, in the file named after it."""
 
 
 Structure = tuple[int, int | None, int | None, bool, bool]
-"""Number of unknowns, of equalities and inequalities, and which bounds there are not."""
-
-NOTHING: Final = None, None
-FAILED: Final = Answer(None, claimed=False)
+"""Number of unknowns, of equalities and inequalities, and which bounds are missing."""
 
 
 class WarmSolver:
-    """A back end with a workspace per call site, made anew where the structure changes."""
+    """A back end with a workspace per call site, remade where the structure changes."""
 
     __slots__ = ("_make", "_settings", "_sites")
 
@@ -40,11 +37,11 @@ class WarmSolver:
         self._sites: dict[int, tuple[Structure, Workspace]] = {}
 
     def __call__(self, program: QuadraticProgram, site: int) -> Answer:
-        """Solve a program; a failure of any kind is an answer that claims nothing.
+        """Solve a program; any failure gives an answer that is not claimed.
 
         Args:
             program: what to solve.
-            site: number of the call within its control step: the same site meets similar programs.
+            site: number of the call within its control step; a site sees similar programs.
         """
         b, h = program.b, program.h
         structure = (
@@ -54,24 +51,24 @@ class WarmSolver:
             program.lb is None,
             program.ub is None,
         )
-        known, workspace = self._sites.get(site, NOTHING)
-        answer = FAILED
+        known, workspace = self._sites.pop(site, (None, None))
         if workspace is not None and known == structure:
-            answer = _solved(workspace, program)
-        if not answer.claimed:  # what failed is no place to start from: once more, from scratch
-            self._sites.pop(site, None)
-            try:
-                workspace = self._make(program, self._settings)
-            except Exception:
-                return FAILED
             answer = _solved(workspace, program)
             if answer.claimed:
                 self._sites[site] = structure, workspace
+                return answer
+        try:  # from scratch, without what failed
+            workspace = self._make(program, self._settings)
+        except Exception:
+            return Answer(None, claimed=False)
+        answer = _solved(workspace, program)
+        if answer.claimed:
+            self._sites[site] = structure, workspace
         return answer
 
 
 def _solved(workspace: Workspace, program: QuadraticProgram) -> Answer:
     try:
         return workspace.solve(program)
-    except Exception:  # each library has its own
-        return FAILED
+    except Exception:  # each library raises its own
+        return Answer(None, claimed=False)

@@ -1,4 +1,4 @@
-"""What every warm back end offers."""
+"""The interface of every warm back end."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ class Workspace(Protocol):
     """Memory and factors of one solver for programs of one structure."""
 
     def __init__(self, program: QuadraticProgram, settings: Mapping[str, Any]) -> None:
-        """Make room for programs of this one's structure."""
+        """Allocate memory for programs of this one's structure."""
         ...
 
     def solve(self, program: QuadraticProgram) -> Answer:
-        """Put this program's values in, start from the answer before, and solve.
+        """Solve a program of this structure, starting from the previous answer.
 
-        The arrays of the answer are the caller's own. Its core time is that of the library's call
-        that solves; taking the values over is the interface's.
+        The arrays of the answer belong to the caller. Its core time is that of the library's
+        solving call, without the copying of values.
         """
         ...

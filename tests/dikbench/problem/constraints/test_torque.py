@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 
 from dikbench import DikbenchError, Robot, TorqueConstraint, load_robot, solve_dik
+from dikbench.arrays import Array
 from dikbench.problem.constraints.torque import mass_matrix
 from dikbench.robots.kinematics import Kinematics
 
@@ -50,8 +51,9 @@ def test_slope_of_the_torque_is_the_mass_matrix(name: str) -> None:
     before = np.full(robot.nv, 0.3)
     constraint = TorqueConstraint()
 
-    def torque(v: np.ndarray) -> np.ndarray:
-        return constraint.torques(robot, robot.q0[None], v[None], before[None], DT)[0]
+    def torque(v: Array) -> Array:
+        found: Array = constraint.torques(robot, robot.q0[None], v[None], before[None], DT)[0]
+        return found
 
     slope = np.column_stack(
         [(torque(before + 1e-3 * e) - torque(before - 1e-3 * e)) / 2e-3 for e in np.eye(robot.nv)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 
@@ -11,10 +12,10 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from makers.problems import problem_of
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.problem import DikProblem
 from dikbench.problem.tasks import (
     CentreOfMassTask,
     DampingTask,
@@ -25,7 +26,6 @@ from dikbench.problem.tasks import (
     PostureTask,
     Task,
 )
-from dikbench.problem.tasks.posture import middle_posture
 from dikbench.problem.tasks.task import stacked
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
@@ -362,7 +362,7 @@ def test_a_centre_of_mass_needs_three_finite_numbers(target: object) -> None:
 
 
 def _weighted(kind: str, robot: Robot, weight: object) -> LinearizedTask:
-    task: Task = {
+    makers: dict[str, Callable[[], Task]] = {
         "posture": lambda: PostureTask(robot.q0 + 0.1, weight=weight),  # type: ignore[arg-type]
         "damping": lambda: DampingTask(weight=weight),  # type: ignore[arg-type]
         "centre": lambda: CentreOfMassTask(np.ones(3), weight=weight),  # type: ignore[arg-type]
@@ -372,8 +372,8 @@ def _weighted(kind: str, robot: Robot, weight: object) -> LinearizedTask:
         ),
         "position": lambda: PositionTask(np.ones(3), weight=weight),  # type: ignore[arg-type]
         "orientation": lambda: OrientationTask(np.eye(3), weight=weight),  # type: ignore[arg-type]
-    }[kind]()
-    return task.linearize(_at(robot, robot.q0 + 0.2))
+    }
+    return makers[kind]().linearize(_at(robot, robot.q0 + 0.2))
 
 
 KINDS = {"posture": 7, "damping": 7, "centre": 3, "pose": 6, "position": 3, "orientation": 3}
@@ -437,6 +437,7 @@ def test_the_log_derivative_of_a_stack_is_block_diagonal() -> None:
     assert Jl is not None
     assert Jl.shape == (13, 13)
     assert np.array_equal(Jl[:7, :7], np.eye(7))
+    assert pose.log_derivative is not None
     assert np.array_equal(Jl[7:, 7:], pose.log_derivative)
     assert np.all(Jl[:7, 7:] == 0)
     assert np.all(Jl[7:, :7] == 0)
@@ -446,43 +447,25 @@ def test_a_problem_sorts_its_tasks_into_levels() -> None:
     """One stacked task per priority, the most important first, and that one is the primary."""
     robot = load_robot("panda")
     a, b, c = _task(2, priority=1), _task(3, priority=1), _task(4, priority=5)
-    limits = robot.limits.at(robot.q0)
-    problem = DikProblem(robot, robot.q0, None, 0.01, [a, b, c], limits)
+    problem = problem_of(a, b, c, robot=robot)
     assert [len(level.V) for level in problem.levels] == [5, 4]
     assert np.array_equal(problem.primary.V, np.concatenate([a.V, b.V]))
     assert problem.levels[1] is c
-    alone = DikProblem(robot, robot.q0, None, 0.01, [a, c], limits)
+    alone = problem_of(a, c, robot=robot)
     assert alone.primary is a
-    shuffled = DikProblem(robot, robot.q0, None, 0.01, [a, c, b], limits)
+    shuffled = problem_of(a, c, b, robot=robot)
     assert [level.priority for level in shuffled.levels] == [1, 5]
 
 
 # --- joint centring
 
 
-def test_middle_posture_is_the_middle_of_the_limits() -> None:
-    """Half way between lower and upper, as far from both."""
-    robot = load_robot("planar3r").with_limits(position=([-1, -2, 0], [3, 1, 0.5]))
-    assert middle_posture(robot) == pytest.approx([1.0, -0.5, 0.25])
+def test_the_middle_is_half_way_between_the_limits() -> None:
+    """As far from the lower as from the upper limit, NaN for a joint that lacks one."""
+    robot = load_robot("planar3r").with_limits(position=([-1, -2, 0], [3, 1, np.inf]))
+    np.testing.assert_array_equal(robot.limits.middle, [1.0, -0.5, np.nan])
     panda = load_robot("panda")
-    seen = panda.limits.at(middle_posture(panda))
+    assert panda.limits.middle is not None
+    seen = panda.limits.at(panda.limits.middle)
     assert seen.to_lower == pytest.approx(seen.to_upper)
-
-
-def test_middle_posture_needs_limits_on_every_joint() -> None:
-    """Without them there is no middle: an error that names the robot."""
-    for robot in (
-        load_robot("panda").with_limits(position=None),
-        load_robot("panda").with_limits(position=[1, 1, 1, np.inf, 1, 1, 1]),
-        _kinova(),
-    ):
-        with pytest.raises(DikbenchError, match=f"robot {robot.name}: not every joint"):
-            middle_posture(robot)
-
-
-def test_middle_posture_leaves_the_robots_start() -> None:
-    """The start is not overwritten."""
-    robot = load_robot("panda")
-    start = robot.q0.copy()
-    middle_posture(robot)
-    assert np.array_equal(robot.q0, start)
+    assert panda.with_limits(position=None).limits.middle is None

@@ -1,10 +1,10 @@
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
 from pathlib import Path
 
-import pandas as pd
 import pytest
+from makers.rows import make_rows
 
 from dikbench.plugins.building import make_scenario
 from dikbench.plugins.finding import plugins
@@ -22,8 +22,6 @@ from dikbench.report.selection.situations import (
     Situation,
     situation_of,
 )
-
-MakeRows = Callable[..., pd.DataFrame]
 
 FORMULATION = '''
 raise SystemExit("this file was run")
@@ -48,7 +46,7 @@ class Mine:
 '''
 
 
-def test_a_law_given_as_a_file_is_read_and_not_run(tmp_path: Path, make_rows: MakeRows) -> None:
+def test_a_law_given_as_a_file_is_read_and_not_run(tmp_path: Path) -> None:
     """Results name files; remaking a report takes the docstring from them and executes nothing."""
     file = tmp_path / "mine.py"
     file.write_text(FORMULATION)
@@ -62,7 +60,7 @@ def test_a_law_given_as_a_file_is_read_and_not_run(tmp_path: Path, make_rows: Ma
 
 @pytest.mark.parametrize("content", [None, "", "def f(", "\x00", "class Other: pass"])
 def test_a_law_whose_file_says_nothing_is_named_all_the_same(
-    tmp_path: Path, make_rows: MakeRows, content: str | None
+    tmp_path: Path, content: str | None
 ) -> None:
     """A file that is gone, empty or no Python leaves the formulation without a text."""
     if content is not None:
@@ -72,7 +70,7 @@ def test_a_law_whose_file_says_nothing_is_named_all_the_same(
     assert formulation.name.endswith("mine.py:Mine")
 
 
-def test_variants_of_a_law_stand_together_with_every_attribute(make_rows: MakeRows) -> None:
+def test_variants_of_a_law_stand_together_with_every_attribute() -> None:
     """What was given goes before the defaults; solvers are those with which it ran."""
     rows = make_rows(
         {
@@ -100,9 +98,8 @@ def test_every_shipped_docstring_is_taken_apart(kind: str) -> None:
         parsed = parse_docstring(text)
         assert parsed.summary == plugin.summary
         assert "Source" in parsed.titled
-        assert set(parsed.entries) >= {name for name in plugin.parameters if f" {name}:" in text}, (
-            plugin.name
-        )
+        explained = set(re.findall(r"^ +(\w+): ", text, re.MULTILINE))
+        assert set(parsed.entries) >= explained & set(plugin.parameters), plugin.name
         parts = [
             parsed.summary,
             *(paragraph.text for paragraph in parsed.paragraphs),
@@ -114,7 +111,7 @@ def test_every_shipped_docstring_is_taken_apart(kind: str) -> None:
         assert lost <= {"Attributes", "Args"}, plugin.name
 
 
-def test_families_say_what_they_certify(make_rows: MakeRows) -> None:
+def test_families_say_what_they_certify() -> None:
     """The claims are those of the scenario itself; what cannot be built says why."""
     selectors = ("near-miss[miss=0.02]", "near-miss[miss=-1]", "unheard-of")
     near_miss, unheard_of = families_of(make_rows({"pinv": {}}, selectors))

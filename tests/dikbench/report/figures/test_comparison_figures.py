@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
-import pandas as pd
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from makers.rows import random_rows
 
 from dikbench.report.drawing.labels import label_points
 from dikbench.report.drawing.style import style
@@ -18,8 +18,6 @@ from dikbench.report.figures.error_and_time import cost_points, draw_error_and_t
 from dikbench.report.figures.pareto import contender_points, draw_off_course_and_slow_down, front
 from dikbench.report.figures.time_split import PARTS, draw_time_split, time_parts
 from dikbench.report.selection.rows import that_ran
-
-MakeTrials = Callable[..., pd.DataFrame]
 
 SCENARIOS = ["reach", "step", "hold-still"]
 
@@ -34,11 +32,9 @@ def test_nothing_beats_a_point_of_the_front(points: list[tuple[int, int]]) -> No
         assert best == (not beaten)
 
 
-def test_points_of_off_course_and_slow_down(
-    make_trials: MakeTrials, drawn: list[Any], target: Path
-) -> None:
+def test_points_of_off_course_and_slow_down(drawn: list[Any], target: Path) -> None:
     """A point is the mean over the scenarios; a law that violates is hollow and off the front."""
-    trials = make_trials(["slow", "wide", "both", "violating", "slower"], SCENARIOS)
+    trials = random_rows(["slow", "wide", "both", "violating", "slower"], SCENARIOS)
     contender = trials["formulation"]
     trials["progress_mean"] = contender.map(
         {"slow": 0.5, "wide": 1.0, "both": 0.4, "violating": 1.0, "slower": 0.1}
@@ -60,20 +56,18 @@ def test_points_of_off_course_and_slow_down(
     assert (target / figure.png).is_file()
 
 
-def test_a_failed_trial_counts_worst(make_trials: MakeTrials) -> None:
+def test_a_failed_trial_counts_worst() -> None:
     """A trial that failed is 180 deg off course and makes none of the motion."""
-    trials = make_trials(["dls"], SCENARIOS).assign(direction_error_max_rad=0.0, progress_mean=1.0)
+    trials = random_rows(["dls"], SCENARIOS).assign(direction_error_max_rad=0.0, progress_mean=1.0)
     trials.loc[0, "status"] = "diverged"
     points = contender_points(trials)
     assert points.loc["dls", "off_course"] == 60.0
-    assert round(points.loc["dls", "slow_down"], 6) == 33.333333
+    assert points.loc["dls", "slow_down"] == pytest.approx(100 / 3)
 
 
-def test_error_against_time_is_a_point_per_law_and_solver(
-    make_trials: MakeTrials, drawn: list[Any], target: Path
-) -> None:
+def test_error_against_time_is_a_point_per_law_and_solver(drawn: list[Any], target: Path) -> None:
     """Medians over the timed scenarios, one point per law and solver, hollow where unstable."""
-    trials = make_trials(["dls", ("qp", "daqp"), ("qp", "osqp")], SCENARIOS)
+    trials = random_rows(["dls", ("qp", "daqp"), ("qp", "osqp")], SCENARIOS)
     trials = that_ran(trials.drop(columns="contour_error_rms_m", errors="ignore"))
     trials.loc[trials["solver"].eq("osqp"), "timing_stability"] = "drift: of the machine"
     trials.loc[trials["scenario"].eq("step"), "formulation_time_p99_us"] = np.nan
@@ -97,11 +91,9 @@ def test_error_against_time_is_a_point_per_law_and_solver(
     assert {text.get_text() for text in drawn[0].axes[0].texts} >= set(points.index)
 
 
-def test_bars_are_the_parts_of_a_step(
-    make_trials: MakeTrials, drawn: list[Any], target: Path
-) -> None:
+def test_bars_are_the_parts_of_a_step(drawn: list[Any], target: Path) -> None:
     """Each bar is stacked of the medians of its parts, the fast laws above on an axis of theirs."""
-    trials = that_ran(make_trials(["dls", ("qp", "daqp")], SCENARIOS))
+    trials = that_ran(random_rows(["dls", ("qp", "daqp")], SCENARIOS))
     slow = trials["solver"].eq("daqp")
     times = [name for name in trials.columns if name.endswith("_us")]
     trials.loc[slow, times] = 100.0 * trials.loc[slow, times]

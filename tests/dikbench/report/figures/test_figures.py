@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pandas as pd
 import pytest
+from makers.rows import random_rows
 
 from dikbench.metrics import METRICS
 from dikbench.report.drawing.figure import Figure
@@ -18,9 +19,12 @@ from dikbench.report.figures.every import draw_figures
 from dikbench.results.columns import TIMES
 from dikbench.results.folder import ResultsFolder
 
-MakeTrials = Callable[..., pd.DataFrame]
-
-LAWS = ["dls[damping=0.1]", "dls[damping=0.2]", "dls[damping=0.3]", ("qp", "daqp")]
+LAWS: list[str | tuple[str, str]] = [
+    "dls[damping=0.1]",
+    "dls[damping=0.2]",
+    "dls[damping=0.3]",
+    ("qp", "daqp"),
+]
 SCENARIOS = [f"near-miss[miss={miss},speed={v}]" for miss in (0, 0.1, 0.2) for v in (1, 2)]
 
 KINDS = {
@@ -30,7 +34,7 @@ KINDS = {
     "error_against_miss_1.svg",
     "peak_speed_against_miss_1.svg",
     "off_course_against_slow_down.svg",
-    "law_dls_damping_1.svg",
+    "formulation_dls_damping_1.svg",
     "error_against_time_per_formulation.svg",
     "time_per_formulation_and_solver.svg",
 }
@@ -51,25 +55,32 @@ def files(figures: Iterable[Figure]) -> set[str]:
     return {figure.file for figure in figures if "profiles" not in figure.file}
 
 
-def test_every_kind_is_drawn(make_trials: MakeTrials, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Figure]]:
+    """A folder in which a table was drawn that has data for all figures, and the figures."""
+    folder = tmp_path_factory.mktemp("whole")
+    return folder, drawn_in(folder, random_rows(LAWS, SCENARIOS))
+
+
+def test_every_kind_is_drawn(whole: tuple[Path, list[Figure]]) -> None:
     """A table that has data for every figure but those against time gives them all."""
-    assert files(drawn_in(tmp_path, make_trials(LAWS, SCENARIOS))) == KINDS
+    assert files(whole[1]) == KINDS
 
 
-def test_the_same_table_gives_the_same_bytes(make_trials: MakeTrials, tmp_path: Path) -> None:
+def test_the_same_table_gives_the_same_bytes(
+    whole: tuple[Path, list[Figure]], tmp_path: Path
+) -> None:
     """Drawn twice, every file is the same to the last byte."""
-    trials, folders = make_trials(LAWS, SCENARIOS), [tmp_path / "1", tmp_path / "2"]
-    for folder in folders:
-        folder.mkdir()
-        drawn_in(folder, trials)
-    first, second = (sorted((folder / "figures").iterdir()) for folder in folders)
+    drawn_in(tmp_path, random_rows(LAWS, SCENARIOS))
+    first, second = (sorted((folder / "figures").iterdir()) for folder in (whole[0], tmp_path))
     assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
 
 
-def test_an_svg_may_stand_in_a_page(make_trials: MakeTrials, tmp_path: Path) -> None:
+def test_an_svg_may_stand_in_a_page(whole: tuple[Path, list[Figure]]) -> None:
     """No SVG has a style sheet, or names for groups that another one has too; each has a font."""
-    for figure in drawn_in(tmp_path, make_trials(LAWS, SCENARIOS)):
-        root = ElementTree.fromstring((tmp_path / "figures" / figure.file).read_bytes())
+    folder, figures = whole
+    for figure in figures:
+        root = ElementTree.fromstring((folder / "figures" / figure.file).read_bytes())
         tags = [element.tag.rpartition("}")[2] for element in root.iter()]
         assert "style" not in tags
         assert "text" in tags
@@ -131,7 +142,7 @@ OUTCOME = {"phase_diagram_1_outcome.svg"}
     [
         (_none, set()),
         (_skipped, set()),
-        (_one_law, KINDS - {"law_dls_damping_1.svg"}),
+        (_one_law, KINDS - {"formulation_dls_damping_1.svg"}),
         (_one_trial, {*TIMED, "off_course_against_slow_down.svg"}),
         (_failed, {*OUTCOME, "time_per_formulation_and_solver.svg"}),
         (_only_saturating, KINDS),
@@ -143,13 +154,12 @@ OUTCOME = {"phase_diagram_1_outcome.svg"}
     ],
 )
 def test_a_figure_without_data_is_left_out(
-    make_trials: MakeTrials,
     tmp_path: Path,
     degenerate: Callable[[pd.DataFrame], pd.DataFrame],
     expected: set[str] | None,
 ) -> None:
     """Of a degenerate table what can be drawn is drawn, without an error or a warning."""
-    found = files(drawn_in(tmp_path, degenerate(make_trials(LAWS, SCENARIOS))))
+    found = files(drawn_in(tmp_path, degenerate(random_rows(LAWS, SCENARIOS))))
     assert found == expected if expected is not None else found <= KINDS
 
 
@@ -164,12 +174,12 @@ HOSTILE = [
 ]
 
 
-def test_hostile_names_stay_text(make_trials: MakeTrials, tmp_path: Path) -> None:
+def test_hostile_names_stay_text(tmp_path: Path) -> None:
     """Names that are markup, paths or formulas are written as they are, and in no file name."""
     formulations = [f"{HOSTILE[0]}[../p<={value}]" for value in (1, 2, 3)] + HOSTILE[1:]
     scenarios = [f"{HOSTILE[1]}[<b>/../={value}]" for value in (1, 2, 3)]
-    figures = drawn_in(tmp_path, make_trials(formulations, scenarios))
-    assert any("law_" in figure.file for figure in figures)
+    figures = drawn_in(tmp_path, random_rows(formulations, scenarios))
+    assert any("formulation_" in figure.file for figure in figures)
     written = ""
     for figure in figures:
         assert set(figure.file) <= set(file_name(figure.file[:-4]) + ".svg")
@@ -184,7 +194,7 @@ def test_hostile_names_stay_text(make_trials: MakeTrials, tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("parts", "name"),
     [
-        (("formulation", "../../etc/passwd", 1), "law_etc-passwd_1"),
+        (("formulation", "../../etc/passwd", 1), "formulation_etc-passwd_1"),
         (("<script>",), "script"),
         (("a/b\\c\0d", "", 2), "a-b-c-d_2"),
         (("x" * 300,), "x" * 40),

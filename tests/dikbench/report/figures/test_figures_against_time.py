@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
+from makers.rows import random_rows
 
 from dikbench.metrics import Motion, motion_of
 from dikbench.plugins.building import make_formulation, make_scenario
@@ -22,8 +22,6 @@ from dikbench.scenario.plant import Ideal
 from dikbench.simulation.closed_loop import simulate
 from dikbench.simulation.trace import Trace
 from dikbench.solvers.checked_solve import make_solve
-
-MakeTrials = Callable[..., pd.DataFrame]
 
 CROSSING = "joint-limit-crossing[robot=ur5]"
 LAWS = ["pinv", "pinv[after=clip]", "dls"]
@@ -42,9 +40,9 @@ def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def trials(make_trials: MakeTrials) -> pd.DataFrame:
+def trials() -> pd.DataFrame:
     """The rows of the three formulations, and of a fourth whose trace was not kept."""
-    return make_trials([*LAWS, "sdls"], [CROSSING])
+    return random_rows([*LAWS, "sdls"], [CROSSING])
 
 
 def curves(axes: Any) -> dict[str, Any]:

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
+from makers.rows import random_rows
 from matplotlib.collections import QuadMesh
 
+from dikbench.arrays import Array
 from dikbench.report.drawing.style import style
 from dikbench.report.figures.phase_diagram import draw_phase_diagrams, three_digits
 from dikbench.report.selection.categories import CATEGORIES, categories
 from dikbench.report.selection.phase_grids import phase_grids
-
-MakeTrials = Callable[..., pd.DataFrame]
 
 MISSES, SPEEDS = (0.0, 0.01, 0.1), (0.2, 1.0)
 
@@ -25,17 +23,16 @@ GRID = [
 ]
 
 
-def cells(axis: Any, mesh: int = 0) -> np.ndarray[Any, Any]:
+def cells(axis: Any, mesh: int = 0) -> Array:
     """The values of a map, (speeds, misses), without the gap after miss = 0; NaN where none is."""
     found = [artist for artist in axis.collections if isinstance(artist, QuadMesh)][mesh]
-    return np.delete(np.ma.filled(found.get_array().astype(float), np.nan), 1, axis=1)
+    values: Any = found.get_array()
+    return np.delete(np.ma.filled(values.astype(float), np.nan), 1, axis=1)
 
 
-def test_cells_hold_what_the_table_says(
-    make_trials: MakeTrials, drawn: list[Any], target: Path
-) -> None:
+def test_cells_hold_what_the_table_says(drawn: list[Any], target: Path) -> None:
     """Each cell of the error and of the speed map is the trial's value, and is written in it."""
-    trials = make_trials(["dls", "pinv"], GRID)
+    trials = random_rows(["dls", "pinv"], GRID)
     trials["contour_error_rms_m"] = 2.0 * trials["position_error_rms_m"]
     with style():
         figures = draw_phase_diagrams(trials, target)
@@ -58,9 +55,9 @@ def test_cells_hold_what_the_table_says(
             ]
 
 
-def test_the_worst_that_applies_is_the_outcome(make_trials: MakeTrials) -> None:
+def test_the_worst_that_applies_is_the_outcome() -> None:
     """Failed comes before violating, that before off course, that before slow."""
-    trials = make_trials(["dls"], GRID)
+    trials = random_rows(["dls"], GRID)
     trials["status"] = ["crashed", *["ok"] * 5]
     trials["violating_share"] = [0.5, 0.5, 0.0, 0.0, 0.0, np.nan]
     trials["direction_error_max_rad"] = [1.0, 1.0, 1.0, 0.0, 0.0, np.nan]
@@ -69,11 +66,9 @@ def test_the_worst_that_applies_is_the_outcome(make_trials: MakeTrials) -> None:
     assert named == ["failed", "violating", "off course", "slow", "ok", "ok"]
 
 
-def test_a_failed_trial_is_black_and_a_missing_one_blank(
-    make_trials: MakeTrials, drawn: list[Any], target: Path
-) -> None:
+def test_a_failed_trial_is_black_and_a_missing_one_blank(drawn: list[Any], target: Path) -> None:
     """No number of a trial that did not end well is shown, nor of one that was never run."""
-    trials = make_trials(["dls"], GRID)
+    trials = random_rows(["dls"], GRID)
     trials.loc[0, "status"] = "diverged"
     with style():
         draw_phase_diagrams(trials.drop(index=5), target)
@@ -88,11 +83,9 @@ def test_a_failed_trial_is_black_and_a_missing_one_blank(
     assert cells(drawn[2].axes[0])[0, 0] == CATEGORIES.index("failed")
 
 
-def test_laws_stand_in_the_order_of_how_they_do(
-    make_trials: MakeTrials, drawn: list[Any], target: Path
-) -> None:
+def test_laws_stand_in_the_order_of_how_they_do(drawn: list[Any], target: Path) -> None:
     """The oracle first, a law that keeps the limits before one that does not, then by the error."""
-    trials = make_trials(["violating", "far", "near", "oracle"], GRID)
+    trials = random_rows(["violating", "far", "near", "oracle"], GRID)
     formulation = trials["formulation"]
     trials["violating_share"] = formulation.eq("violating") * 1.0
     trials["direction_error_max_rad"] = 0.0
@@ -107,20 +100,18 @@ def test_laws_stand_in_the_order_of_how_they_do(
     assert titles == ["oracle", "near", "far", "violating"]
 
 
-def test_a_row_of_near_misses_is_no_grid(make_trials: MakeTrials) -> None:
+def test_a_row_of_near_misses_is_no_grid() -> None:
     """Two misses at two speeds are a grid, three misses at one speed are none."""
-    assert len(phase_grids(make_trials(["dls"], GRID[:4]))) == 1
-    assert not phase_grids(make_trials(["dls"], GRID[::2]))
-    assert not phase_grids(make_trials(["dls"], ["near-miss", "reach[miss=1,speed=1]"]))
+    assert len(phase_grids(random_rows(["dls"], GRID[:4]))) == 1
+    assert not phase_grids(random_rows(["dls"], GRID[::2]))
+    assert not phase_grids(random_rows(["dls"], ["near-miss", "reach[miss=1,speed=1]"]))
 
 
-def test_many_laws_make_several_pages(
-    make_trials: MakeTrials, drawn: list[Any], target: Path
-) -> None:
+def test_many_laws_make_several_pages(drawn: list[Any], target: Path) -> None:
     """21 formulations are in two figures of about as many panels, and none is left out."""
     names = [f"formulation-{number}" for number in range(21)]
     with style():
-        figures = draw_phase_diagrams(make_trials(names, GRID[:4]), target)
+        figures = draw_phase_diagrams(random_rows(names, GRID[:4]), target)
     errors = [
         shown for figure, shown in zip(figures, drawn, strict=True) if "_error" in figure.file
     ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import matplotlib.figure
 import numpy as np
@@ -10,6 +11,7 @@ import pandas as pd
 import pytest
 
 import dikbench.report.figures.profiles as figures
+from dikbench.arrays import Array
 from dikbench.report.drawing.style import style
 from dikbench.report.figures.profiles import NAMED, Costs, draw_profiles
 from dikbench.report.selection.rows import LEAST_ERROR
@@ -17,7 +19,7 @@ from dikbench.report.selection.rows import LEAST_ERROR
 INF = np.inf
 
 
-def _trials(contenders: dict[str, list[float]], **columns: list[str]) -> pd.DataFrame:
+def _trials(contenders: dict[str, list[float | None]], **columns: list[str]) -> pd.DataFrame:
     """A trial per law and scenario with its contour error; infinite: it failed, None: skipped."""
     rows = []
     for contender, errors in contenders.items():
@@ -52,8 +54,10 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> dict[str, matplotlib.figure.Figure
     return kept
 
 
-def _line(axis: object, label: str) -> np.ndarray:
-    return next(line for line in axis.get_lines() if line.get_label() == label).get_xydata()  # type: ignore[attr-defined]
+def _line(axis: Any, label: str) -> Array:
+    line = next(line for line in axis.get_lines() if line.get_label() == label)
+    points: Array = line.get_xydata()
+    return points
 
 
 def test_failures_and_skips_are_problems_not_solved() -> None:
@@ -155,7 +159,7 @@ def test_of_many_laws_the_best_are_named(drawn: dict[str, matplotlib.figure.Figu
     with style():
         caption = draw_profiles(trials, Path())[0].caption
         labels = [line.get_label() for line in drawn["performance_profiles_1"].axes[0].get_lines()]
-    named = [label for label in labels if not label.startswith("_")]
+    named = [label for label in map(str, labels) if not label.startswith("_")]
     assert named == [f"formulation{i}" for i in range(NAMED)]
     assert len(labels) == 12
     assert f"the {12 - NAMED} after the eighth in grey" in caption
@@ -166,7 +170,7 @@ def test_of_many_laws_the_best_are_named(drawn: dict[str, matplotlib.figure.Figu
     [{}, {"a": [1e-3]}, {"a": [INF], "b": [INF]}, {"a": [1e-3], "oracle": [0.0]}, {"a": [None]}],
 )
 def test_nothing_to_compare_is_no_figure(
-    contenders: dict[str, list[float]], tmp_path: Path
+    contenders: dict[str, list[float | None]], tmp_path: Path
 ) -> None:
     """No trials, one formulation, nothing but failures, nobody but the oracle."""
     trials = _trials(contenders) if contenders else _trials({"a": [1e-3]}).iloc[:0]

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
+from makers.rows import random_rows
 
 from dikbench.report.drawing.style import style
 from dikbench.report.drawing.value_scale import ValueScale
@@ -16,35 +15,31 @@ from dikbench.report.figures.formulation_sweeps import draw_formulation_sweeps, 
 from dikbench.report.figures.scenario_sweeps import draw_sweeps
 from dikbench.report.selection.sweeps import sweeps
 
-MakeTrials = Callable[..., pd.DataFrame]
-
 MISSES = ("0", "0.01", "0.1")
 
 
-def test_a_grid_is_one_sweep(make_trials: MakeTrials) -> None:
+def test_a_grid_is_one_sweep() -> None:
     """Of miss x speed the longer axis is swept and the other one tells the curves apart."""
     grid = [f"near-miss[miss={m},speed={v}]" for v in ("1", "2", "3") for m in (*MISSES, "1")]
-    (sweep,) = sweeps(make_trials(["dls"], grid))
+    (sweep,) = sweeps(random_rows(["dls"], grid))
     assert (sweep.family, sweep.parameter, sweep.second) == ("near-miss", "miss", "speed")
     assert set(zip(sweep.rows["value"], sweep.rows["second"], strict=True)) == {
         (float(m), v) for m in (*MISSES, "1") for v in ("1", "2", "3")
     }
 
 
-def test_robots_are_curves_of_one_sweep(make_trials: MakeTrials) -> None:
+def test_robots_are_curves_of_one_sweep() -> None:
     """A parameter that is no number tells curves apart too; two values are no sweep."""
     names = [f"reach[robot={r},gain={g}]" for r in ("ur5", "panda") for g in (4, 5, 6)]
     names += ["step[distance=1]", "step[distance=2]", "hold-still"]
-    (sweep,) = sweeps(make_trials(["dls"], names))
+    (sweep,) = sweeps(random_rows(["dls"], names))
     assert (sweep.family, sweep.parameter, sweep.second) == ("reach", "gain", "robot")
 
 
-def test_curves_hold_what_the_table_says(
-    make_trials: MakeTrials, drawn: list[Any], target: Path
-) -> None:
+def test_curves_hold_what_the_table_says(drawn: list[Any], target: Path) -> None:
     """Each formulation has a panel, each of its points is the median over the seeds."""
     scenarios = [f"near-miss[miss={miss}]" for miss in MISSES]
-    trials = make_trials(["dls", "pinv"], scenarios, seeds=(0, 1, 2))
+    trials = random_rows(["dls", "pinv"], scenarios, seeds=(0, 1, 2))
     trials = trials.drop(columns="contour_error_rms_m", errors="ignore")
     with style():
         figures = draw_sweeps(trials, target)
@@ -66,11 +61,9 @@ def test_curves_hold_what_the_table_says(
         np.testing.assert_allclose(heights, wanted.clip(lower=1e-2))
 
 
-def test_a_failed_trial_is_a_gap_and_a_cross(
-    make_trials: MakeTrials, drawn: list[Any], target: Path
-) -> None:
+def test_a_failed_trial_is_a_gap_and_a_cross(drawn: list[Any], target: Path) -> None:
     """Where a trial failed its curve has no point, and a cross stands at the top."""
-    trials = make_trials(["dls"], [f"near-miss[miss={miss}]" for miss in ("0.1", "0.2", "0.3")])
+    trials = random_rows(["dls"], [f"near-miss[miss={miss}]" for miss in ("0.1", "0.2", "0.3")])
     trials.loc[1, "status"] = "timeout"
     with style():
         draw_sweeps(trials, target)
@@ -92,18 +85,18 @@ def test_zero_stands_apart_on_a_logarithmic_scale() -> None:
 
 
 def test_a_law_sweep_takes_the_median_error_and_the_worst_violation(
-    make_trials: MakeTrials, drawn: list[Any], target: Path
+    drawn: list[Any], target: Path
 ) -> None:
     """Against the damping: per family the median error, the largest speed and violation."""
     formulations = [f"dls[damping={damping}]" for damping in ("0.01", "0.1", "1")]
     scenarios = ["reach", "reach[gain=2]", "reach[gain=4]", "step"]
-    trials = make_trials([*formulations, "pinv", "qp[gain=1]"], scenarios)
+    trials = random_rows([*formulations, "pinv", "qp[gain=1]"], scenarios)
     trials = trials.drop(columns="contour_error_rms_m", errors="ignore")
     (sweep,) = formulation_sweeps(trials)
     assert (sweep.formulation, sweep.parameter) == ("dls", "damping")
     with style():
         (figure,) = draw_formulation_sweeps(trials, target)
-    assert figure.file == "law_dls_damping_1.svg"
+    assert figure.file == "formulation_dls_damping_1.svg"
     reach = trials[trials["scenario"].str.startswith("reach")]
     by_formulation = reach.groupby("formulation", sort=False)
     wanted = (
@@ -117,13 +110,13 @@ def test_a_law_sweep_takes_the_median_error_and_the_worst_violation(
         np.testing.assert_allclose(curve.get_xdata(), [0.0, 1.0, 2.0])
 
 
-@pytest.mark.parametrize("count", [1, 13, 60])
-def test_any_number_of_laws_is_drawn(make_trials: MakeTrials, target: Path, count: int) -> None:
-    """One formulation, a dozen and many are drawn, each page below 200 kB."""
+@pytest.mark.parametrize("count", [1, 13, 25])
+def test_any_number_of_laws_is_drawn(target: Path, count: int) -> None:
+    """One formulation, a dozen and one more than a page holds, each page below 200 kB."""
     names = [f"a-formulation-with-a-rather-long-name-{number}[gain=1]" for number in range(count)]
     scenarios = [f"near-miss[miss={miss}]" for miss in ("0.1", "0.2", "0.3")]
     with style():
-        figures = draw_sweeps(make_trials(names, scenarios), target)
+        figures = draw_sweeps(random_rows(names, scenarios), target)
     assert len(figures) == 2 * -(-count // 24)
     for figure in figures:
         assert (target / figure.file).stat().st_size < 200_000

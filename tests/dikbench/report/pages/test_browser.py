@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
 import pytest
+from makers.rows import make_rows, write_results
 
 from dikbench.report.write import write_report
 
@@ -18,9 +18,6 @@ from selenium.webdriver.chrome.service import Service  # noqa: E402
 from selenium.webdriver.common.by import By  # noqa: E402
 from selenium.webdriver.common.keys import Keys  # noqa: E402
 from selenium.webdriver.support.ui import WebDriverWait  # noqa: E402
-
-MakeRows = Callable[..., pd.DataFrame]
-WriteResults = Callable[..., Path]
 
 BROWSER = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), ""
@@ -52,9 +49,7 @@ OPTIONS = (
 
 
 @pytest.fixture(scope="module")
-def report(
-    tmp_path_factory: pytest.TempPathFactory, make_rows: MakeRows, write_results: WriteResults
-) -> Path:
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A report on five formulations, one of which failed, by its file."""
     formulations: dict[Any, Any] = {
         name: {"position_error_rms_m": [error, error * 1.1], "formulation_time_median_us": error}

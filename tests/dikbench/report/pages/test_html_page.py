@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from html.parser import HTMLParser
 from itertools import pairwise
@@ -9,12 +8,10 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from makers.rows import Values, make_rows, write_results
 
 from dikbench.report.tables.table import Column, TableCell
 from dikbench.report.write import write_report
-
-MakeRows = Callable[..., pd.DataFrame]
-WriteResults = Callable[..., Path]
 
 VOID = {"meta", "img", "input", "br", "link", "hr"}
 HOSTILE = '<script>alert("1")</script>&amp;`<img src=x onerror=alert(1)>`../../x'
@@ -63,9 +60,7 @@ class Page(HTMLParser):
 
 
 @pytest.fixture(scope="module")
-def report(
-    tmp_path_factory: pytest.TempPathFactory, make_rows: MakeRows, write_results: WriteResults
-) -> Path:
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a report on two plants, with a failure, unstable times and a hostile law."""
     folder = tmp_path_factory.mktemp("report") / "out"
     scenarios = ("reach", "near-miss[miss=0.02]", f"near-miss[robot={HOSTILE.replace('`', '')}]")
@@ -74,7 +69,7 @@ def report(
         "formulation_time_p99_us": 12.0,
         "timing_stability": "stable",
     }
-    formulations = {
+    formulations: dict[str | tuple[str, str], Values] = {
         "pinv": {"position_error_rms_m": [0.003, 0.02, 0.1], **times},
         "dls[damping=0.1]": {"position_error_rms_m": 0.02, **times, "timing_stability": "drift"},
         ("qp", "daqp"): {
@@ -213,8 +208,6 @@ def test_the_markdown_says_the_same(report: Path) -> None:
 
 def test_a_figure_without_room_is_a_file_beside_the_page(
     tmp_path: Path,
-    make_rows: MakeRows,
-    write_results: WriteResults,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The page stays small, and says where the figure is."""

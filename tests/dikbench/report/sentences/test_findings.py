@@ -1,11 +1,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import pandas as pd
 from hypothesis import given
 from hypothesis import strategies as st
+from makers.rows import make_rows
 
 from dikbench.report.sentences.findings import (
     fail_most,
@@ -19,13 +19,11 @@ from dikbench.report.sentences.findings import (
 from dikbench.report.sentences.paired_wins import ROUNDING, SAME, lead
 from dikbench.report.sentences.words import Names, number
 
-MakeRows = Callable[..., pd.DataFrame]
-
 THREE = ("reach", "near-miss[miss=0.02]", "near-miss[miss=0.005]")
 TOO_FAST = {"velocity_violation_max_rad_s": 1.0, "velocity_peak_ratio": 3.0}
 
 
-def test_the_closest_law_is_named_with_its_number_and_the_next_one(make_rows: MakeRows) -> None:
+def test_the_closest_law_is_named_with_its_number_and_the_next_one() -> None:
     """The median, the runner-up and in how many trials it was behind stand in the sentence."""
     rows = make_rows(
         {
@@ -40,12 +38,13 @@ def test_the_closest_law_is_named_with_its_number_and_the_next_one(make_rows: Ma
     assert "Every limit is kept" in text
 
 
-def test_laws_that_are_the_same_are_not_ranked(make_rows: MakeRows) -> None:
+def test_laws_that_are_the_same_are_not_ranked() -> None:
     """Values that differ by less than 1 % are a tie, whoever comes first."""
     values = {"position_error_rms_m": 0.001}
     alike = {"position_error_rms_m": 0.001 * (1 + SAME / 2)}
-    for contenders in ({"a": values, "b": alike}, {"b": alike, "a": values}):
-        rows = make_rows(contenders, THREE)
+    for contenders in (("a", "b"), ("b", "a")):
+        said = {"a": values, "b": alike}
+        rows = make_rows({name: said[name] for name in contenders}, THREE)
         found = most_accurate(rows, Names(rows)).text
         assert found.startswith(
             " and ".join(f"`{name}`" for name in contenders) + ", not told apart,"
@@ -53,7 +52,7 @@ def test_laws_that_are_the_same_are_not_ranked(make_rows: MakeRows) -> None:
         assert "next is" not in found
 
 
-def test_a_better_median_that_wins_too_few_trials_is_a_tie(make_rows: MakeRows) -> None:
+def test_a_better_median_that_wins_too_few_trials_is_a_tie() -> None:
     """One scenario that moves the median does not make a formulation the best."""
     rows = make_rows(
         {
@@ -107,9 +106,7 @@ def test_a_lead_is_what_it_says(values: list[list[float]]) -> None:
         assert found.wins == wins >= 2 * losses
 
 
-def test_a_law_that_failed_or_whose_answers_are_wrong_leads_in_nothing(
-    make_rows: MakeRows,
-) -> None:
+def test_a_law_that_failed_or_whose_answers_are_wrong_leads_in_nothing() -> None:
     """Of survivors nothing is said, nor of a solver whose claims the recheck denies."""
     best, fair = {"position_error_rms_m": 1e-6}, {"position_error_rms_m": 0.01}
     rows = make_rows(
@@ -127,7 +124,7 @@ def test_a_law_that_failed_or_whose_answers_are_wrong_leads_in_nothing(
     assert most_accurate(missing, names).text.startswith("No formulation in this run")
 
 
-def test_without_a_keeper_no_law_is_named(make_rows: MakeRows) -> None:
+def test_without_a_keeper_no_law_is_named() -> None:
     """Where every law passes a limit the sentences say that none qualifies, and by how much."""
     rows = make_rows({"a": TOO_FAST, "b": TOO_FAST}, THREE)
     names = Names(rows)
@@ -139,7 +136,7 @@ def test_without_a_keeper_no_law_is_named(make_rows: MakeRows) -> None:
     assert "joint speeds reach 3 times their limit" in most_accurate(rows, names).text
 
 
-def test_a_solvers_tolerance_breaks_no_limit_and_more_does(make_rows: MakeRows) -> None:
+def test_a_solvers_tolerance_breaks_no_limit_and_more_does() -> None:
     """Limits passed by less than 1e-4 are kept; one violation in one trial is one too many."""
     tolerance = {"velocity_violation_max_rad_s": 9e-5, "position_violation_max_rad": 9e-5}
     rows = make_rows(
@@ -155,7 +152,7 @@ def test_a_solvers_tolerance_breaks_no_limit_and_more_does(make_rows: MakeRows) 
     assert keepers(rows) == [("kept", "none")]
 
 
-def test_who_stays_on_course_and_who_of_them_gets_on(make_rows: MakeRows) -> None:
+def test_who_stays_on_course_and_who_of_them_gets_on() -> None:
     """The course is kept within a degree; of those inside the limits the fastest is named."""
     rows = make_rows(
         {
@@ -175,7 +172,7 @@ def test_who_stays_on_course_and_who_of_them_gets_on(make_rows: MakeRows) -> Non
     )
 
 
-def test_who_fails_most(make_rows: MakeRows) -> None:
+def test_who_fails_most() -> None:
     """By trials that broke off; where none did, by steps without an answer."""
     rows = make_rows(
         {"a": {"status": ["ok", "timeout", "crashed"]}, "b": {"status": ["ok", "ok", "timeout"]}},
@@ -194,7 +191,7 @@ def test_who_fails_most(make_rows: MakeRows) -> None:
     assert fail_most(rows, Names(rows)).text == "No trial failed and every step was answered."
 
 
-def test_times_that_a_stable_cell_may_drift_apart_are_a_tie(make_rows: MakeRows) -> None:
+def test_times_that_a_stable_cell_may_drift_apart_are_a_tie() -> None:
     """Formulations within 25 % share the first place; unstable cells are counted beside it."""
     times = {"a": 10.0, "b": 12.0, "c": 100.0}
     rows = make_rows(
@@ -215,7 +212,7 @@ def test_times_that_a_stable_cell_may_drift_apart_are_a_tie(make_rows: MakeRows)
     assert fastest(make_rows({"a": {}}), [], names).text == "No times were taken."
 
 
-def test_solvers_are_named_as_shortly_as_they_can(make_rows: MakeRows) -> None:
+def test_solvers_are_named_as_shortly_as_they_can() -> None:
     """All of them, all but a few, or one by one."""
     rows = make_rows(
         {("qp", solver): {} for solver in ("daqp", "osqp", "piqp", "highs")} | {"a": {}}

@@ -1,14 +1,13 @@
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import pandas as pd
 import pytest
+from makers.rows import make_rows
 
 from dikbench.report.sentences.limitations import in_plan, limitations, missing
 
-MakeRows = Callable[..., pd.DataFrame]
 STUDY: dict[str, Any] = {"study": {"name": "a"}}
 
 
@@ -18,7 +17,7 @@ def told(rows: pd.DataFrame, manifest: dict[str, Any] = STUDY) -> str:
     return "\n".join(line for each in found for line in (each.text, *each.cases))
 
 
-def test_each_limitation_is_said_where_it_applies_and_only_there(make_rows: MakeRows) -> None:
+def test_each_limitation_is_said_where_it_applies_and_only_there() -> None:
     """A faultless run has none of those that a faulty one has."""
     faults: dict[str, dict[str, Any]] = {
         "1 trial failed": {"status": ["timeout", "ok"], "message": "not finished after 4 s"},
@@ -45,7 +44,7 @@ def test_each_limitation_is_said_where_it_applies_and_only_there(make_rows: Make
         assert sentence in told(make_rows({"a": fault, "b": {}}, scenarios)), sentence
 
 
-def test_one_seed_no_times_and_one_way_of_running_are_said(make_rows: MakeRows) -> None:
+def test_one_seed_no_times_and_one_way_of_running_are_said() -> None:
     """More seeds, times and the other plant and reference mode take their sentences away."""
     one = make_rows({"pinv": {}})
     for sentence in (
@@ -65,7 +64,7 @@ def test_one_seed_no_times_and_one_way_of_running_are_said(make_rows: MakeRows) 
     assert "The oracle, a measure" not in everything
 
 
-def test_what_was_not_run_is_what_is_registered_without_what_was(make_rows: MakeRows) -> None:
+def test_what_was_not_run_is_what_is_registered_without_what_was() -> None:
     """A formulation that ran is not listed among those of which nothing is said."""
     text = told(make_rows({"pinv[after=clip]": {}}))
     line = next(line for line in text.split("\n") if " formulations: " in line)
@@ -73,7 +72,7 @@ def test_what_was_not_run_is_what_is_registered_without_what_was(make_rows: Make
     assert "`pinv`" not in line
 
 
-def test_trials_that_are_missing_are_counted(make_rows: MakeRows) -> None:
+def test_trials_that_are_missing_are_counted() -> None:
     """Planned trials without a row are missing; rows that the study does not ask for are others."""
     rows = make_rows({"pinv": {}, ("qp", "daqp"): {}, "dls": {}}, seeds=(0, 1))
     study = {
@@ -88,6 +87,6 @@ def test_trials_that_are_missing_are_counted(make_rows: MakeRows) -> None:
 
 
 @pytest.mark.parametrize("seed", [5, 0])
-def test_the_seed_is_named(make_rows: MakeRows, seed: int) -> None:
+def test_the_seed_is_named(seed: int) -> None:
     """Which seed it was stands in the sentence."""
     assert f"There is one seed ({seed})" in told(make_rows({"pinv": {}}, seeds=(seed,)))

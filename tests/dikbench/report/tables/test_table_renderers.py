@@ -149,7 +149,7 @@ def test_the_console_fits_a_screen() -> None:
     assert text.count("contender") < 2 * (ROWS + 2) + 4
     assert text.count("and 28 more: tables/made_up.md") == 2
     assert "(1): tables/made_up.md" in text
-    assert text.index("law00") < text.index("law01")  # the best first
+    assert text.index("formulation00") < text.index("formulation01")  # the best first
     assert "heading" in text
 
 

@@ -12,12 +12,14 @@ from statistics import fmean, median
 import numpy as np
 import pandas as pd
 import pytest
+from makers.rows import bare_rows
 
 from dikbench.report.tables.build import make_table
 from dikbench.report.tables.csv_table import to_csv
 from dikbench.report.tables.files import write_table
 from dikbench.report.tables.kinds import KINDS, LIMIT_VIOLATION, TIMING, TRACKING_ERROR
 from dikbench.report.tables.table import Block, Table, TableCell
+from dikbench.results.selected import with_selected
 
 Rows = list[dict[str, str]]
 
@@ -209,7 +211,7 @@ def _synthetic(path: Path) -> Path:
                             "timing_stability": verdict if timed else None,
                         }
                     )
-    pd.DataFrame(rows).to_csv(path, index=False)
+    with_selected(pd.DataFrame(rows)).to_csv(path, index=False)
     return path
 
 
@@ -292,22 +294,9 @@ def _best(table: Table, key: str, family: str = "all", plant: str | None = "idea
     return {contender for contender, cell in cells.items() if cell.best}
 
 
-def _trials(**columns: list[object]) -> pd.DataFrame:
-    """Trials of one scenario, a formulation each, with what a table needs at least."""
-    frame = pd.DataFrame(columns)
-    given = {
-        "solver": "none", "scenario": "reach", "plant": "ideal", "reference": "time", "seed": 0,
-        "status": "ok", "formulation_time_median_us": np.nan, "timing_stability": None,
-    }  # fmt: skip
-    for name, value in given.items():
-        if name not in frame:
-            frame[name] = value
-    return frame
-
-
 def test_a_law_that_fails_wins_no_average_over_the_trials_it_survived() -> None:
     """It is not compared where its failures are left out; in the worst it is infinite."""
-    trials = _trials(
+    trials = bare_rows(
         formulation=["a", "a", "b", "b", "c", "c"],
         scenario=["reach", "step"] * 3,
         status=["ok", "diverged", "ok", "ok", "ok", "ok"],
@@ -331,7 +320,7 @@ def test_a_law_that_fails_wins_no_average_over_the_trials_it_survived() -> None:
 
 def test_a_failure_where_nothing_is_measured_does_not_disqualify_the_others() -> None:
     """A law that fails a scenario without a path leaves the laws beside it to be compared."""
-    trials = _trials(
+    trials = bare_rows(
         formulation=["a", "a", "b", "b", "c", "c"],
         scenario=["reach", "step"] * 3,
         status=["ok", "crashed", "ok", "ok", "ok", "ok"],
@@ -349,7 +338,7 @@ def test_a_failure_where_nothing_is_measured_does_not_disqualify_the_others() ->
 
 def test_a_law_that_was_skipped_somewhere_is_not_compared_overall() -> None:
     """An average over the easier scenarios is no win either; nor is the oracle's."""
-    trials = _trials(
+    trials = bare_rows(
         formulation=["a", "a", "b", "b", "oracle", "oracle"],
         scenario=["reach", "step"] * 3,
         status=["ok", "skipped", "ok", "ok", "ok", "ok"],
@@ -374,13 +363,13 @@ def test_the_best_are_those_that_nobody_beats_to_what_is_shown(
     errors: list[float], best: set[str]
 ) -> None:
     """Ties are marked together, and nobody where all are equally good."""
-    trials = _trials(formulation=["a", "b", "c"], position_error_max_m=errors)
+    trials = bare_rows(formulation=["a", "b", "c"], position_error_max_m=errors)
     assert _best(make_table(TRACKING_ERROR, trials), "position_error_max_m_worst") == best
 
 
 def test_more_progress_is_better() -> None:
     """The direction is the metric's; the worst progress is the smallest."""
-    trials = _trials(
+    trials = bare_rows(
         formulation=["a", "a", "b", "b"], scenario=["reach", "step"] * 2,
         progress_mean=[1.0, 0.5, 0.7, 0.7], progress_min=[1.0, -0.5, 0.7, 0.6],
     )  # fmt: skip
@@ -423,7 +412,7 @@ def test_a_law_that_crashed_everywhere_stands_in_the_timing_table(synthetic: Pat
 
 def test_columns_that_older_results_lack_are_left_out() -> None:
     """No crash, no empty column."""
-    trials = _trials(formulation=["a", "b"], position_error_rms_m=[0.1, 0.2])
+    trials = bare_rows(formulation=["a", "b"], position_error_rms_m=[0.1, 0.2])
     keys = [column.key for column in make_table(TRACKING_ERROR, trials).columns]
     assert keys == ["failure_rate", "failed", "trials", "position_error_rms_m"]
 
@@ -432,7 +421,7 @@ def test_columns_that_older_results_lack_are_left_out() -> None:
 def test_nothing_to_show_is_a_table_without_blocks(status: list[str]) -> None:
     """No trials, and none but skipped ones; every form of it says so or is empty."""
     number = len(status)
-    trials = _trials(
+    trials = bare_rows(
         formulation=["a", "b"][:number], status=status, position_error_rms_m=[np.nan] * number
     )
     for kind in KINDS:
@@ -443,7 +432,7 @@ def test_nothing_to_show_is_a_table_without_blocks(status: list[str]) -> None:
 
 def test_one_trial_and_a_law_of_nothing_but_failures() -> None:
     """A single trial has its value and no interval, a failed one its failure and no average."""
-    trials = _trials(
+    trials = bare_rows(
         formulation=["a", "b"], status=["ok", "timeout"], position_error_rms_m=[0.1, np.nan]
     )
     table = make_table(TRACKING_ERROR, trials)

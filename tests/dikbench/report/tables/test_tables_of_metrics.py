@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 
-import pandas as pd
+from makers.rows import random_rows
 
 from dikbench.cli.listing import description
 from dikbench.metrics import METRICS
@@ -14,14 +13,12 @@ from dikbench.report.tables.csv_table import to_csv
 from dikbench.report.tables.kinds import KINDS
 
 
-def test_show_names_the_tables_in_which_a_metric_stands(
-    make_trials: Callable[..., pd.DataFrame],
-) -> None:
+def test_show_names_the_tables_in_which_a_metric_stands() -> None:
     """Those with a column of its name, or of its worst value; every metric in some way.
 
     The rest of what it says is what the registry says, and the direction in words.
     """
-    trials = make_trials(["pinv", "dls"], ["reach"])
+    trials = random_rows(["pinv", "dls"], ["reach"])
     headings = {
         kind.name: to_csv(make_table(kind, trials)).partition("\n")[0].split(",") for kind in KINDS
     }

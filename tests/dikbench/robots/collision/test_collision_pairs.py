@@ -19,7 +19,7 @@ from dikbench import (
     load_robot,
 )
 from dikbench.arrays import Array
-from dikbench.robots.collision.bodies import LINK_RADIUS, collision_bodies
+from dikbench.robots.collision.bodies import LINK_RADIUS_M, collision_bodies
 from dikbench.robots.collision.pairs import CollisionPairs
 from dikbench.robots.example_robot_data import data_file
 from dikbench.robots.kinematics import Kinematics
@@ -83,16 +83,17 @@ def test_distances_of_a_planar_arm_are_those_of_segments() -> None:
         points = planar_joints(q, (0.25,) * 4)
         links = list(itertools.pairwise(points))
         apart = [
-            segments_apart(*links[i], *links[j]) - 2 * LINK_RADIUS
+            segments_apart(*links[i], *links[j]) - 2 * LINK_RADIUS_M
             for i, j in ((0, 2), (0, 3), (1, 3))
         ]
         centre, foot, head = (np.array(x, dtype=float) for x in (ball.centre, pole.start, pole.end))
         for start, end in links:
             way = end - start
             t = np.clip((centre - start) @ way / (way @ way), 0, 1)
-            apart.append(np.linalg.norm(centre - start - t * way) - LINK_RADIUS - ball.radius)
-        apart += [segments_apart(*link, foot, head) - LINK_RADIUS - pole.radius for link in links]
-        apart += [1.3 - max(start[0], end[0]) - LINK_RADIUS for start, end in links]
+            away = float(np.linalg.norm(centre - start - t * way))
+            apart.append(away - LINK_RADIUS_M - ball.radius)
+        apart += [segments_apart(*link, foot, head) - LINK_RADIUS_M - pole.radius for link in links]
+        apart += [1.3 - max(start[0], end[0]) - LINK_RADIUS_M for start, end in links]
         assert pairs.distances(at(robot, q)) == pytest.approx(np.array(apart), abs=1e-6)
 
 

@@ -16,7 +16,8 @@ def beyond(points: Array, start: Array, end: Array, radius: float) -> Array:
     way = end - start
     length = float(way @ way)
     t = np.zeros(len(points)) if length == 0 else np.clip((points - start) @ way / length, 0, 1)
-    return np.linalg.norm(points - start - t[:, None] * way, axis=1) - radius
+    away: Array = np.linalg.norm(points - start - t[:, None] * way, axis=1)
+    return away - radius
 
 
 @given(seed=st.integers(0, 10**6), count=st.integers(2, 60), flat=st.integers(0, 3))

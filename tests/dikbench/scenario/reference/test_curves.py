@@ -10,11 +10,17 @@ import pytest
 
 from dikbench.arrays import Array
 from dikbench.robots.catalogue import load_robot
-from dikbench.scenario.reference.curves import FLAT, UPRIGHT, circle, lemniscate, plane_of
+from dikbench.scenario.reference.curves import (
+    WORLD_XY_PLANE,
+    WORLD_YZ_PLANE,
+    circle,
+    lemniscate,
+    plane_of,
+)
 from dikbench.scenario.reference.reference import Reference
 
 START = pin.SE3(pin.exp3(np.array([0.4, -0.7, 1.1])), np.array([0.5, -0.2, 0.3]))
-PLANES = (UPRIGHT, FLAT, pin.exp3(np.array([0.3, 0.2, -0.5])) @ UPRIGHT)
+PLANES = (WORLD_YZ_PLANE, WORLD_XY_PLANE, pin.exp3(np.array([0.3, 0.2, -0.5])) @ WORLD_YZ_PLANE)
 
 Curve = Callable[..., Reference]
 
@@ -80,5 +86,5 @@ def test_the_frame_turns_about_the_normal_by_the_angle_given(curve: Curve) -> No
 
 def test_planar_arms_keep_to_their_plane() -> None:
     """Their curves are in x-y; those of arms in space stand upright."""
-    assert plane_of(load_robot("planar4r")) is FLAT
-    assert plane_of(load_robot("ur5")) is UPRIGHT
+    assert plane_of(load_robot("planar4r")) is WORLD_XY_PLANE
+    assert plane_of(load_robot("ur5")) is WORLD_YZ_PLANE

@@ -3,58 +3,23 @@
 from __future__ import annotations
 
 import importlib.util
+from typing import get_args
 
 import numpy as np
 import pytest
+from makers.programs import ACCURACY, INSTALLED, LIBRARIES_WARN, mixture, projection, solve_with
 
-from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.programs.quadratic_program import ProgramKind, QuadraticProgram
 from dikbench.solvers.catalogue.back_ends import (
     BACK_ENDS,
     DEFAULT_SOLVER,
-    INTERFACES,
+    Interface,
     Solver,
-    is_installed,
     parse_solver,
     why_not,
 )
-from dikbench.solvers.checked_solve import CheckedSolve, make_solve
 
-# The libraries warn beside each failure; `dikbench.solvers` silences them, pytest resets that.
-pytestmark = [
-    pytest.mark.filterwarnings(r"ignore::UserWarning:qpsolvers\."),
-    pytest.mark.filterwarnings(r"ignore::UserWarning:cvxpy\.|dikbench\.solvers\.modelled"),
-]
-
-INSTALLED = [name for name in BACK_ENDS if is_installed(name)]
-
-ACCURACY = 5e-3
-"""The loosest default tolerance (OSQP's 1e-3), with room for the conditioning of the examples."""
-
-
-def _solve(selector: str, program: ProgramKind = "qp") -> CheckedSolve:
-    return make_solve(parse_solver(selector), program)
-
-
-def _projection() -> tuple[QuadraticProgram, Array]:
-    """The point of the box [0, 1]^3 that is nearest to c: c clipped."""
-    c = np.array([0.5, 2.0, -3.0])
-    return QuadraticProgram(np.eye(3), -c, lb=np.zeros(3), ub=np.ones(3)), np.clip(c, 0, 1)
-
-
-def _mixture() -> tuple[QuadraticProgram, Array]:
-    """Everything at once, the optimum put together from its multipliers.
-
-    x = (1, 0, 0.5): the upper bound of x_1 active (multiplier 2), the lower one of x_2 (-3), the
-    inequality x_1 + x_3 <= 1.5 active (0.5) and x_1 + x_2 - x_3 = 0.5 (-1), so that
-    q = -(P x + G'z + A'y + w).
-    """
-    P, x = np.diag([1.0, 2.0, 4.0]), np.array([1.0, 0.0, 0.5])
-    G, A = np.array([[1.0, 0.0, 1.0]]), np.array([[1.0, 1.0, -1.0]])
-    q = -(P @ x + G.T @ [0.5] + A.T @ [-1.0] + np.array([2.0, -3.0, 0.0]))
-    bounds = {"lb": np.array([-1.0, 0.0, -1.0]), "ub": np.array([1.0, 1.0, 1.0])}
-    return QuadraticProgram(P, q, G, np.array([1.5]), A, np.array([0.5]), **bounds), x
+pytestmark = LIBRARIES_WARN
 
 
 def _osqp() -> Solver:
@@ -126,16 +91,16 @@ def test_a_solver_that_is_not_installed_says_how_to_install_it(
 def test_every_setting_in_the_catalogue_is_taken(name: str, interface: str, key: str) -> None:
     """Each solver takes each of its settings through each interface and still solves."""
     value = {float: "1e-6", int: "2000", bool: "true"}[BACK_ENDS[name].settings[key]]
-    program, x = _projection()
-    solve = _solve(f"{name}[interface={interface},{key}={value}]")
+    program, x = projection()
+    solve = solve_with(f"{name}[interface={interface},{key}={value}]")
     assert solve(program) == pytest.approx(x, abs=ACCURACY)
 
 
 def test_a_tighter_tolerance_reaches_the_library() -> None:
     """OSQP at 1e-9 is nearer to the solution than at 1e-2, on a program that needs iterations."""
-    program, x = _mixture()
+    program, x = mixture()
     loose, tight = (
-        np.abs(_solve(f"osqp[eps_abs={eps},eps_rel={eps}]")(program) - x).max()
+        np.abs(solve_with(f"osqp[eps_abs={eps},eps_rel={eps}]")(program) - x).max()
         for eps in (1e-2, 1e-9)
     )
     assert tight < 1e-7 < loose
@@ -157,8 +122,8 @@ def test_the_catalogue_is_consistent() -> None:
     """Interfaces are known ones, defaults can do what they are for, gaps have their reason."""
     for name, back_end in BACK_ENDS.items():
         assert back_end.interfaces
-        assert set(back_end.interfaces) <= set(INTERFACES), name
-        assert set(back_end.ours) <= set(back_end.settings), name
+        assert set(back_end.interfaces) <= set(get_args(Interface)), name
+        assert set(back_end.own_defaults) <= set(back_end.settings), name
         assert ("lp" in back_end.programs) == (not back_end.no_lp), name
     for program, name in DEFAULT_SOLVER.items():
         assert why_not(parse_solver(name), program) == ""

@@ -6,19 +6,16 @@ import math
 
 import numpy as np
 import pytest
+from makers.programs import LIBRARIES_WARN, mixture
 
 from dikbench.arrays import Array
 from dikbench.programs.answer import Answer
 from dikbench.programs.quadratic_program import QuadraticProgram
 from dikbench.solvers.catalogue.presets import TOLERANCES
-from dikbench.solvers.recheck.residuals import SAMPLED, Residuals, residuals
+from dikbench.solvers.recheck.residuals import EIGENVALUE_SAMPLE_STRIDE, Residuals, residuals
 from dikbench.solvers.recheck.stack import Stack
 
-# The libraries warn beside each failure; `dikbench.solvers` silences them, pytest resets that.
-pytestmark = [
-    pytest.mark.filterwarnings(r"ignore::UserWarning:qpsolvers\."),
-    pytest.mark.filterwarnings(r"ignore::UserWarning:cvxpy\.|dikbench\.solvers\.modelled"),
-]
+pytestmark = LIBRARIES_WARN
 
 
 TOLERANCE = TOLERANCES["default"]
@@ -32,23 +29,9 @@ def _of(program: QuadraticProgram, answer: Answer) -> Residuals:
     return found
 
 
-def _mixture() -> tuple[QuadraticProgram, Array]:
-    """Everything at once, the optimum put together from its multipliers.
-
-    x = (1, 0, 0.5): the upper bound of x_1 active (multiplier 2), the lower one of x_2 (-3), the
-    inequality x_1 + x_3 <= 1.5 active (0.5) and x_1 + x_2 - x_3 = 0.5 (-1), so that
-    q = -(P x + G'z + A'y + w).
-    """
-    P, x = np.diag([1.0, 2.0, 4.0]), np.array([1.0, 0.0, 0.5])
-    G, A = np.array([[1.0, 0.0, 1.0]]), np.array([[1.0, 1.0, -1.0]])
-    q = -(P @ x + G.T @ [0.5] + A.T @ [-1.0] + np.array([2.0, -3.0, 0.0]))
-    bounds = {"lb": np.array([-1.0, 0.0, -1.0]), "ub": np.array([1.0, 1.0, 1.0])}
-    return QuadraticProgram(P, q, G, np.array([1.5]), A, np.array([0.5]), **bounds), x
-
-
 def test_residuals_of_the_right_answer_are_zero() -> None:
     """The optimum that was put together from its multipliers, with these multipliers."""
-    program, x = _mixture()
+    program, x = mixture()
     answer = Answer(
         x, True, y=np.array([-1.0]), z=np.array([0.5]), z_box=np.array([2.0, -3.0, 0.0])
     )
@@ -71,7 +54,7 @@ def test_residuals_of_the_right_answer_are_zero() -> None:
 )
 def test_the_primal_residual_is_the_worst_violation(x: list[float], primal: float) -> None:
     """Of equalities, inequalities and bounds alike."""
-    program, _ = _mixture()
+    program, _ = mixture()
     answer = Answer(np.array(x), True, np.zeros(1), np.zeros(1), np.zeros(3))
     assert _of(program, answer).primal == pytest.approx(primal)
 
@@ -118,7 +101,7 @@ def test_a_multiplier_of_an_infinite_bound_is_a_dual_residual(sign: int) -> None
     assert found.dual == pytest.approx(2.0)
     assert found.gap == 0.0
     right = _of(program, Answer(np.array([2.0 * sign]), True, z_box=np.zeros(1)))
-    assert (right.primal, right.dual, right.gap) == (0.0, 0.0, 0.0)
+    assert [right.primal, right.dual, right.gap] == [0.0, 0.0, 0.0]
 
 
 def test_an_infinite_side_of_an_inequality_does_not_count() -> None:
@@ -127,7 +110,7 @@ def test_an_infinite_side_of_an_inequality_does_not_count() -> None:
         np.eye(1), np.array([-2.0]), np.ones((2, 1)), np.array([np.inf, 1.0])
     )
     found = _of(program, Answer(np.ones(1), True, z=np.array([0.0, 1.0])))
-    assert (found.primal, found.dual, found.gap) == (0.0, 0.0, 0.0)
+    assert [found.primal, found.dual, found.gap] == [0.0, 0.0, 0.0]
 
 
 def test_dual_residuals_are_relative_to_the_cost() -> None:
@@ -168,9 +151,9 @@ def test_the_tolerance_of_verification(excess: float) -> None:
 def test_a_stack_gives_each_answer_its_own_residuals() -> None:
     """Programs of one structure with answers of every quality: the same as one by one."""
     random = np.random.default_rng(0)
-    program, x = _mixture()
+    program, x = mixture()
     programs, answers = [], []
-    for k in range(3 * SAMPLED):
+    for k in range(3 * EIGENVALUE_SAMPLE_STRIDE):
         wrong = 10.0 ** random.uniform(-9, 0) * random.normal(size=8)
         scale = 10.0 ** random.uniform(-2, 2)
         programs.append(_scaled(program, scale))
@@ -270,7 +253,9 @@ COSTS = {"strictly-convex": _definite, "linear": _linear}
 def _all_known(cost: str, seed: int) -> tuple[np.random.Generator, list[_Known]]:
     """More programs than one sample of their costs, of one structure."""
     random = np.random.default_rng([seed, len(cost)])
-    return random, [_Known(random, COSTS[cost](random, 5)) for _ in range(3 * SAMPLED)]
+    return random, [
+        _Known(random, COSTS[cost](random, 5)) for _ in range(3 * EIGENVALUE_SAMPLE_STRIDE)
+    ]
 
 
 def _assert_bounded(found: Residuals, distances: list[float]) -> None:
@@ -346,8 +331,8 @@ def test_one_soft_cost_among_stiff_ones_is_not_hidden_by_the_sample() -> None:
         QuadraticProgram(scale * np.eye(2), np.zeros(2), lb=-np.ones(2), ub=np.ones(2))
         for scale in (1.0, 1e-6)
     )
-    for place in (0, 1, SAMPLED - 1, SAMPLED):
-        programs = [stiff] * (2 * SAMPLED)
+    for place in (0, 1, EIGENVALUE_SAMPLE_STRIDE - 1, EIGENVALUE_SAMPLE_STRIDE):
+        programs = [stiff] * (2 * EIGENVALUE_SAMPLE_STRIDE)
         programs[place] = soft
         answer = Answer(np.array([0.5, 0.0]), True, z_box=np.zeros(2))
         found = residuals(Stack(programs, [answer] * len(programs)))

@@ -1,0 +1,225 @@
+"""The contract that every scenario family keeps, as checks for the author of a family.
+
+    @pytest.mark.parametrize("check", dikbench.testing.FAMILY_CHECKS)
+    def test_contract(check):
+        check(MyFamily())
+
+or, without pytest, `check_family(MyFamily())`. A check that fails raises `AssertionError` with the
+parameter or the seed, and what was violated.
+"""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable
+from dataclasses import is_dataclass, replace
+from math import isfinite, isnan, nan
+from types import UnionType
+from typing import Any, Final, Union, get_args, get_origin
+
+import numpy as np
+
+from dikbench.arrays import Array
+from dikbench.errors import DikbenchError
+from dikbench.parameters import Parameter, parameters_of
+from dikbench.scenario.family import Family
+from dikbench.scenario.scenario import Scenario
+
+SEEDS: Final = (0, 1, 2)
+"""The seeds of the scenarios that are checked; 0 perturbs nothing."""
+
+FamilyCheck = Callable[[Family], None]
+
+
+def check_family_declaration(family: Family) -> None:
+    """Check that the family is a frozen dataclass, derived from `Family`, and says what it is."""
+    name = type(family).__name__
+    frozen = getattr(getattr(family, "__dataclass_params__", None), "frozen", False)
+    if not isinstance(family, Family) or not is_dataclass(family) or not frozen:
+        raise AssertionError(
+            f"{name} is not an instance of a class with @dataclass(frozen=True) that is derived "
+            "from dikbench.scenario.Family"
+        )
+    known = parameters_of(type(family))
+    for parameter in family.grid or ():
+        if parameter not in known:
+            raise AssertionError(
+                f"{name}.grid names {parameter!r}; valid: {', '.join(sorted(known))}"
+            )
+
+
+def check_family_ranges(family: Family) -> None:
+    """Check that every number has a `Range`, and that its ends give a scenario or say why not.
+
+    What is outside of a range, and NaN, must be refused by an error that names the parameter.
+    """
+    for name, parameter in parameters_of(type(family)).items():
+        if not _is_of(parameter, int, float):
+            continue
+        if parameter.range is None:
+            raise AssertionError(f"{name} is a number without a Range")
+        for value in _outside(parameter):
+            try:
+                _changed(family, name, value)
+            except DikbenchError as error:
+                if name not in str(error):
+                    raise AssertionError(
+                        f"{name}={value}: the error does not name it: {error}"
+                    ) from error
+            else:
+                raise AssertionError(f"{name}={value} is accepted; valid: {parameter.valid}")
+        for value in _ends(parameter):
+            try:
+                _changed(family, name, value).scenario(0)
+            except DikbenchError:
+                pass  # it says why there is no such scenario
+            except Exception as error:
+                raise AssertionError(f"{name}={value}: raised {_words(error)}") from error
+
+
+def _changed(family: Family, name: str, value: object) -> Family:
+    changes: dict[str, Any] = {name: value}
+    return replace(family, **changes)
+
+
+def _is_of(parameter: Parameter, *kinds: type) -> bool:
+    union = get_origin(parameter.type) in (Union, UnionType)
+    return any(part in kinds for part in (get_args(parameter.type) if union else [parameter.type]))
+
+
+def _outside(parameter: Parameter) -> list[float]:
+    """List numbers that a parameter must not be: NaN, infinity, and what is next to its ends."""
+    found = [nan, np.inf, -np.inf]
+    assert parameter.range is not None
+    for end, away in ((parameter.range.low, -1.0), (parameter.range.high, 1.0)):
+        if isfinite(end):
+            step = 1.0 if _is_of(parameter, int) else max(1e-6, 1e-6 * abs(end))
+            found.append(end + away * step)
+    return [value for value in found if not parameter.range.holds(value)]
+
+
+def _ends(parameter: Parameter) -> list[float]:
+    """List the finite ends of the range of a parameter and of the bounds in which it is drawn."""
+    assert parameter.range is not None
+    ends = [parameter.range.low, parameter.range.high]
+    if parameter.drawn is not None and not isnan(parameter.drawn.low):
+        ends += [parameter.drawn.low, parameter.drawn.high]
+    finite = [end for end in dict.fromkeys(ends) if isfinite(end)]
+    return [int(end) for end in finite] if _is_of(parameter, int) else finite
+
+
+def check_family_certificate(family: Family) -> None:
+    """Check that the certificate claims something and holds, and that the parts fit together."""
+    for seed in SEEDS:
+        made = _scenario(family, seed)
+        where, robot = f"seed {seed}", made.robot
+        if not made.certificate.claims:
+            raise AssertionError(f"{where}: the certificate claims nothing")
+        for claim in made.certificate.claims:
+            if not claim.holds:
+                raise AssertionError(f"{where}: certificate failed: {claim} is false")
+        for name, value, size in (("q0", made.q0, robot.nq), ("v0", made.v0, robot.nv)):
+            if value.shape != (size,) or not np.isfinite(value).all():
+                raise AssertionError(
+                    f"{where}: {name} must be {size} finite numbers, got {value.tolist()}"
+                )
+        if not all(np.isfinite(part).all() for part in _numbers(made).values()):
+            raise AssertionError(f"{where}: the reference or the start is not finite")
+
+
+def check_family_seeds(family: Family) -> None:
+    """Check that seeds perturb the scenario where a variation is declared, and only there.
+
+    A negative seed must be refused.
+    """
+    try:
+        family.scenario(-1)
+    except DikbenchError:
+        pass
+    else:
+        raise AssertionError("seed -1 is accepted; seeds must not be negative")
+    plain, declared = _scenario(family, 0), str(family.variation)
+    for seed in SEEDS[1:]:
+        changed = _difference(plain, _scenario(family, seed))
+        if changed and declared == "nothing":
+            raise AssertionError(f"seed {seed} changes {changed}; declare it in `variation`")
+        if not changed and declared != "nothing":
+            raise AssertionError(f"seed {seed} changes nothing, but declares {declared}")
+
+
+def check_family_deterministic(family: Family) -> None:
+    """Check that the same parameters and seed give the same scenario, to the bit."""
+    for seed in SEEDS:
+        changed = _difference(_scenario(family, seed), _scenario(family, seed))
+        if changed:
+            raise AssertionError(f"seed {seed}: made again, {changed} is another")
+
+
+def check_family_picklable(family: Family) -> None:
+    """Check that the family can be pickled, and that the copy gives the same scenario."""
+    try:
+        unpickled = pickle.loads(pickle.dumps(family))
+    except Exception as error:
+        raise AssertionError(
+            f"{type(family).__name__} cannot be pickled ({error}); workers are processes: "
+            "define the class at the top of a module, with parameters that pickle"
+        ) from error
+    changed = _difference(_scenario(family, 1), _scenario(unpickled, 1))
+    if changed:
+        raise AssertionError(f"unpickled, {changed} is another")
+
+
+def _scenario(family: Family, seed: int) -> Scenario:
+    """Make the scenario of a seed; whatever goes wrong is a broken contract."""
+    try:
+        return family.scenario(seed)
+    except MemoryError:
+        raise
+    except DikbenchError as error:
+        raise AssertionError(f"seed {seed}: {error}") from error
+    except Exception as error:
+        raise AssertionError(f"seed {seed}: raised {_words(error)}") from error
+
+
+def _words(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}".partition("\n")[0]
+
+
+def _difference(a: Scenario, b: Scenario) -> str:
+    """Name the first part in which two scenarios differ; empty where they do not."""
+    first, second = _numbers(a), _numbers(b)
+    for name, value in first.items():
+        if not np.array_equal(value, second[name], equal_nan=True):
+            return name
+    return ""
+
+
+def _numbers(scenario: Scenario) -> dict[str, Array]:
+    """List what a run sees of a scenario, by name, as arrays."""
+    reference = scenario.reference
+    at = [reference.duration * share for share in np.linspace(0.0, 1.0, 7)]
+    return {
+        "the start": scenario.q0,
+        "the start velocity": scenario.v0,
+        "the duration": np.array([scenario.dt, scenario.duration, reference.duration]),
+        "the path": np.array([reference.placement(tau).homogeneous for tau in at]),
+        "the velocity of the reference": np.array([reference.velocity(tau) for tau in at]),
+        "the certificate": np.array([claim.value for claim in scenario.certificate.claims]),
+    }
+
+
+FAMILY_CHECKS: Final[tuple[FamilyCheck, ...]] = (
+    check_family_declaration,
+    check_family_ranges,
+    check_family_certificate,
+    check_family_seeds,
+    check_family_deterministic,
+    check_family_picklable,
+)
+"""Every check of a family: (family) -> None."""
+
+
+def check_family(family: Family) -> None:
+    """Run every check; the first one that fails raises `AssertionError`."""
+    for check in FAMILY_CHECKS:
+        check(family)

@@ -1,0 +1,79 @@
+"""Every check of a formulation or a family with its outcome, instead of the first failure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from types import MappingProxyType
+from typing import Final, Literal, NamedTuple
+
+from dikbench.problem.problem import Formulation, LimitKind, promises_of
+from dikbench.scenario.family import Family
+from dikbench.testing.asked import Asked
+from dikbench.testing.contract import (
+    CHECKS,
+    Check,
+    check_acceleration_limits,
+    check_declaration,
+    check_inequalities,
+    check_position_limits,
+    check_velocity_limits,
+)
+from dikbench.testing.family import FAMILY_CHECKS, check_family_declaration
+
+PROMISES: Final[Mapping[Check, LimitKind]] = MappingProxyType(
+    {
+        check_position_limits: "position",
+        check_velocity_limits: "velocity",
+        check_acceleration_limits: "acceleration",
+        check_inequalities: "inequalities",
+    }
+)
+"""The checks of what a formulation need not promise, and what it would promise."""
+
+
+class Verdict(NamedTuple):
+    """What came of one check; `reason` says in one line what was violated."""
+
+    check: str
+    outcome: Literal["kept", "not promised", "BROKEN"]
+    reason: str = ""
+
+
+def verdicts_on_formulation(
+    formulation: Formulation, solver: str | None = None
+) -> Iterator[Verdict]:
+    """Run the checks of a formulation one by one; a broken declaration ends them.
+
+    Raises:
+        DikbenchError: if the solver is unknown or cannot take what the formulation needs solved.
+    """
+    declaration = _verdict("declaration", partial(check_declaration, formulation, solver))
+    yield declaration
+    if declaration.outcome == "BROKEN":
+        return
+    asked = Asked(formulation, solver)
+    for check in CHECKS[1:]:
+        name = check.__name__.removeprefix("check_").replace("_", " ")
+        if check in PROMISES and PROMISES[check] not in promises_of(formulation):
+            yield Verdict(name, "not promised")
+        else:
+            yield _verdict(name, partial(check, asked, None))
+
+
+def verdicts_on_family(family: Family) -> Iterator[Verdict]:
+    """Run the checks of a scenario family one by one; a broken declaration ends them."""
+    for check in FAMILY_CHECKS:
+        name = check.__name__.removeprefix("check_family_").replace("_", " ")
+        verdict = _verdict(name, partial(check, family))
+        yield verdict
+        if check is check_family_declaration and verdict.outcome == "BROKEN":
+            return
+
+
+def _verdict(name: str, check: Callable[[], None]) -> Verdict:
+    try:
+        check()
+    except AssertionError as error:
+        return Verdict(name, "BROKEN", " ".join(str(error).split()))
+    return Verdict(name, "kept")

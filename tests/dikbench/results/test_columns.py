@@ -1,0 +1,116 @@
+"""Columns of older results: what the first release wrote is read under today's names."""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+from pathlib import Path
+
+import msgspec
+import pandas as pd
+import pytest
+
+from dikbench.metrics import METRICS
+from dikbench.report.comparison.comparison import compare
+from dikbench.report.write import write_report
+from dikbench.results.reading import read_results
+from dikbench.run.runner import RunSettings, run_study, status_of
+from dikbench.study.study import Cells, Study
+
+COMMITTED = Path(__file__).parents[3] / "results"
+
+FIRST_RELEASE = {
+    "law_time_median_us": "formulation_time_median_us",
+    "law_own_time_median_us": "formulation_own_time_median_us",
+    "law_time_p99_us": "formulation_time_p99_us",
+    "law_time_p999_us": "formulation_time_p999_us",
+    "law_time_max_us": "formulation_time_max_us",
+    "timing_verdict": "timing_stability",
+}
+"""What the first release called the columns whose names have changed since."""
+
+
+def aged(stored: Path, folder: Path) -> Path:
+    """A copy of results whose store is one of the first release."""
+    shutil.copytree(stored, folder)
+    with sqlite3.connect(folder / "results.sqlite") as database:
+        for old, new in FIRST_RELEASE.items():
+            database.execute(f"ALTER TABLE times RENAME COLUMN {new} TO {old}")
+        database.execute("UPDATE meta SET value = '1' WHERE key = 'schema'")
+    database.close()
+    return folder
+
+
+@pytest.mark.parametrize("lenient", [False, True])
+def test_a_store_of_the_first_release_is_read(stored: Path, tmp_path: Path, lenient: bool) -> None:
+    """Every row and every time, to the bit, and nothing is said to be missing."""
+    found = read_results(aged(stored, tmp_path / "old"), lenient=lenient)
+    expected = read_results(stored, lenient=lenient)
+    assert expected.trials["formulation_time_median_us"].notna().any()
+    pd.testing.assert_frame_equal(found.trials, expected.trials, check_exact=True)
+    assert found.notes == ()
+
+
+def test_a_run_continues_in_a_store_of_the_first_release(stored: Path, tmp_path: Path) -> None:
+    """What is there is kept, what is missing is run and timed; exports have today's names."""
+    folder = aged(stored, tmp_path / "old")
+    before = read_results(stored).trials
+    study = msgspec.convert(read_results(stored).manifest["study"], Study)
+    cells = (*study.cells, Cells(("pinv",)))
+    run_study(msgspec.structs.replace(study, cells=cells), folder, RunSettings(jobs=1), "again")
+    after = read_results(folder).trials
+    assert status_of(folder) == {"ok": 6, "skipped": 2}
+    new = after["formulation"] == "pinv"
+    assert new.sum() == 2
+    assert after.loc[new, "formulation_time_median_us"].notna().all()
+    known = after[~new].reset_index(drop=True)
+    kept = ["id", "status", "run", *METRICS]
+    pd.testing.assert_frame_equal(known[kept], before[kept], check_exact=True)
+    exported = pd.read_csv(folder / "trials.csv").columns
+    assert set(FIRST_RELEASE.values()) <= set(exported)
+    assert not set(FIRST_RELEASE) & set(exported)
+
+
+@pytest.mark.parametrize("kind", ["trials.csv", "trials.parquet"])
+def test_exports_of_the_first_release_are_read(committed: Path, tmp_path: Path, kind: str) -> None:
+    """As they would be with today's names."""
+    old = {new: name for name, new in FIRST_RELEASE.items()}
+    shutil.copy(committed / "manifest.json", tmp_path)
+    if kind == "trials.csv":
+        texts = pd.read_csv(committed / kind, dtype=str, keep_default_na=False)
+        texts.rename(columns=old).to_csv(tmp_path / kind, index=False)
+    else:
+        pd.read_parquet(committed / kind).rename(columns=old).to_parquet(tmp_path / kind)
+    found = read_results(tmp_path).trials
+    pd.testing.assert_frame_equal(found, read_results(committed).trials, check_dtype=False)
+    assert not set(FIRST_RELEASE) & set(found)
+
+
+@pytest.mark.parametrize(("name", "trials"), [("quick", 444), ("full", 22680)])
+def test_the_committed_results_are_read(name: str, trials: int) -> None:
+    """Whole, with their times, strictly and leniently."""
+    for lenient in (False, True):
+        found = read_results(COMMITTED / name, lenient=lenient)
+        assert len(found.trials) == trials
+        assert found.trials["formulation_time_median_us"].notna().any()
+        assert found.trials["timing_stability"].eq("stable").any()
+        assert found.notes == ()
+        assert not set(FIRST_RELEASE) & set(found.trials)
+
+
+@pytest.mark.parametrize("name", ["quick", pytest.param("full", marks=pytest.mark.long)])
+def test_the_committed_results_are_reported_and_compared(name: str, tmp_path: Path) -> None:
+    """The page names the fastest formulation, and no time differs from itself."""
+    folder = tmp_path / name
+    folder.mkdir()
+    for file in (COMMITTED / name).iterdir():
+        if file.is_file() and file.name != "report.md":
+            shutil.copy(file, folder)
+    write_report(folder)
+    page = (folder / "report.md").read_text()
+    assert "No times were taken" not in page
+    assert (folder / "tables" / "timing.csv").read_text().count("\n") > 5
+    times = compare(folder, COMMITTED / name).times
+    assert len(times) > 5
+    assert times["ratio"].eq(1.0).all()
+    assert times["p99_ratio"].eq(1.0).all()
