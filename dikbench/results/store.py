@@ -296,24 +296,25 @@ class Store:
             columns = [row[1] for row in self._database.execute("PRAGMA table_info(trials)")]
         except sqlite3.DatabaseError as error:
             raise DikbenchError(f"store {self.path}: not a store of dikbench: {error}") from None
-        if found.get("schema") in {"1", "2"}:
-            columns = self._migrate(columns, times=found["schema"] == "1")
-        elif found.get("schema") != str(SCHEMA_VERSION):
+        if found.get("schema") not in ("1", "2", str(SCHEMA_VERSION)):
             raise OtherVersion(
                 f"store {self.path}: schema version {found.get('schema')!r} is not known; this "
                 f"dikbench reads versions 1 to {SCHEMA_VERSION}"
             )
-        missing = [name for name in NUMBERS if name not in columns]
+        named_today = {RENAMED_METRICS.get(name, name) for name in columns}
+        missing = [name for name in NUMBERS if name not in named_today]
         if missing and not add_metrics:
             raise OtherVersion(
                 f"store {self.path}: written by a dikbench with other metrics (it lacks "
                 f"{min(missing)!r}); choose another folder, or add them with `dikbench recompute`"
             )
+        if found["schema"] != str(SCHEMA_VERSION):
+            self._migrate(columns, times=found["schema"] == "1")
         for name in missing:
             self._database.execute(f"ALTER TABLE trials ADD COLUMN {name} REAL")
 
-    def _migrate(self, columns: Sequence[str], *, times: bool) -> list[str]:
-        """Bring the tables of an earlier version to today's; return the columns of trials.
+    def _migrate(self, columns: Sequence[str], *, times: bool) -> None:
+        """Bring the tables of an earlier version, with these columns of trials, to today's.
 
         Metrics and, of version 1, times are renamed; values of metrics that have another definition
         today are deleted, to be recomputed.
@@ -330,7 +331,6 @@ class Store:
             self._database.execute(
                 "UPDATE meta SET value = ? WHERE key = 'schema'", [str(SCHEMA_VERSION)]
             )
-        return [renamed.get(name, name) for name in columns]
 
     def _check_untouched(self) -> None:
         """Check that the file is still there: SQLite would write to a removed one in silence."""
