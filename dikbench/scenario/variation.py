@@ -36,7 +36,7 @@ class Variation:
             DikbenchError: on a negative seed.
         """
         if seed < 0:
-            raise DikbenchError(f"seed {seed} must be at least 0")
+            raise DikbenchError(f"seed {seed} must not be negative")
         return Perturbation(self, seed)
 
     def __str__(self) -> str:

@@ -22,6 +22,7 @@ import numpy as np
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.parameters import Parameter, parameters_of
+from dikbench.scenario.certificate import CertificateFailed
 from dikbench.scenario.family import Family
 from dikbench.scenario.scenario import Scenario
 
@@ -115,9 +116,10 @@ def check_family_certificate(family: Family) -> None:
         where, robot = f"seed {seed}", made.robot
         if not made.certificate.claims:
             raise AssertionError(f"{where}: the certificate claims nothing")
-        for claim in made.certificate.claims:
-            if not claim.holds:
-                raise AssertionError(f"{where}: certificate failed: {claim} is false")
+        try:
+            made.certificate.check(type(family).__name__)
+        except CertificateFailed as error:
+            raise AssertionError(f"{where}: {error}") from error
         for name, value, size in (("q0", made.q0, robot.nq), ("v0", made.v0, robot.nv)):
             if value.shape != (size,) or not np.isfinite(value).all():
                 raise AssertionError(

@@ -191,8 +191,8 @@ def test_an_arm_that_stays_unfolded_does_not_certify(monkeypatch: pytest.MonkeyP
     """Blunted: half the way."""
     module = sys.modules["scenarios.self_collision"]
     half: Mapping[str, object] = MappingProxyType({"ur5": (0.0, 0.0, 0.6, 0.4, 0.0, 0.0)})
-    monkeypatch.setattr(module, "WAYS", half)
-    with pytest.raises(DikbenchError, match=r"least distance of the reference's motion .* is fal"):
+    monkeypatch.setattr(module, "DISPLACEMENTS", half)
+    with pytest.raises(DikbenchError, match=r"least distance of .* motion .*, must be"):
         make_scenario("self-collision[robot=ur5]")
 
 

@@ -93,7 +93,7 @@ def test_postures_that_are_not_near_are_refused(monkeypatch: pytest.MonkeyPatch)
     with pytest.raises(DikbenchError, match="position margin"):
         make_scenario("hold-still[robot=ur5,posture=limit]")
     put_robot(monkeypatch, load_robot("ur5").with_limits(position=None))
-    with pytest.raises(DikbenchError, match="robot ur5 has no limits"):
+    with pytest.raises(DikbenchError, match="robot ur5 has no position limits"):
         make_scenario("hold-still[robot=ur5,posture=limit]")
 
 

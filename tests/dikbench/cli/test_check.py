@@ -135,7 +135,8 @@ def test_a_family_whose_certificate_fails_for_a_seed(plugins_file: Path) -> None
     """The seed and the claim stand in the line; exit code 1."""
     code, lines = checked(f"{plugins_file}:Near[lie=true]")
     assert code == 1
-    assert "BROKEN        certificate: seed 1: certificate failed: lie = 1 <= 0.5 is false" in lines
+    reason = "certificate of 'Near' failed: lie = 1, must be <= 0.5"
+    assert f"BROKEN        certificate: seed 1: {reason}" in lines
 
 
 @pytest.mark.parametrize(
