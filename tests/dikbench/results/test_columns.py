@@ -97,6 +97,9 @@ def test_the_committed_results_are_read(name: str, trials: int) -> None:
         assert found.trials["timing_stability"].eq("stable").any()
         assert not set(FIRST_RELEASE) & set(found.trials)
         assert found.trials["direction_error_max_rad"].notna().any()
+        assert (
+            not found.trials.filter(items=["lag_max_s", "path_done_share"]).notna().any(axis=None)
+        )
         if lenient:
             (note,) = found.notes
             assert re.search(r"without \d+ of today's metrics \(.*\bslow_down\b", note)
