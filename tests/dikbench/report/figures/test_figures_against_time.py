@@ -99,7 +99,7 @@ def test_margins_are_distances_to_the_nearest_limit(
     stored: Path, trials: pd.DataFrame, drawn: list[Any], target: Path
 ) -> None:
     """The crossing is found whatever the example is; its margins go through the crossing."""
-    trials = pd.concat([trials.assign(scenario="reach"), trials])
+    trials = pd.concat([trials.assign(scenario="reach", scenario_family="reach"), trials])
     with style():
         (figure,) = draw_joint_margins(ResultsFolder(stored), trials, "reach", target)
     shown = curves(drawn[0].axes)
