@@ -366,7 +366,7 @@ def test_a_limit_that_cannot_be_reached_fails_loudly(monkeypatch: pytest.MonkeyP
     narrow = load_robot("ur5").with_limits(position=(position.lower, upper))
     for robot, words in (
         (narrow, "position margin at the start"),
-        (load_robot("ur5").with_limits(position=None), "robot ur5 has no limits"),
+        (load_robot("ur5").with_limits(position=None), "robot ur5 has no position limits"),
     ):
         put_robot(monkeypatch, robot)
         with pytest.raises(DikbenchError, match=words) as caught:
@@ -377,7 +377,7 @@ def test_a_limit_that_cannot_be_reached_fails_loudly(monkeypatch: pytest.MonkeyP
 @pytest.mark.parametrize("name", CLOSED)
 def test_a_negative_seed_is_an_error(name: str) -> None:
     """Random generators take none."""
-    with pytest.raises(DikbenchError, match="seed -1 must not be negative"):
+    with pytest.raises(DikbenchError, match="seed -1 must be at least 0"):
         make_scenario(name, -1)
 
 

@@ -164,7 +164,7 @@ def test_a_base_that_does_not_turn_spirals_in() -> None:
         ("task-conflict[speed=2]", "speed=2.0 must be 0.05 to 0.9"),
         ("log-derivative-drift[turn=3.2]", "turn=3.2 must be -3 to 3 [rad]"),
         ("log-derivative-drift[turn=-1.5]", "turn=-1.5 must be -3 to -2 or 2 to 3 [rad]"),
-        ("log-derivative-drift[robot=panda]", "unknown parameter of scenario log-derivative-drift"),
+        ("log-derivative-drift[robot=panda]", "robot='panda' is not valid: valid: base"),
     ],
 )
 def test_what_cannot_be_is_one_line(selector: str, part: str) -> None:

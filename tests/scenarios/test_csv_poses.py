@@ -17,6 +17,7 @@ from dikbench.robots.kinematics import Kinematics
 
 TRIANGLE = Path(__file__).parents[1] / "data" / "triangle.csv"
 HEADER = "t,x,y,z,qx,qy,qz,qw"
+OUT_OF_REACH = "the pose or the path to it is out of reach of robot panda"
 
 
 def _rows(path: Path) -> np.ndarray:
@@ -89,11 +90,11 @@ def test_laws_follow_the_example() -> None:
 @pytest.mark.parametrize(
     ("rows", "words"),
     [
-        (["0,0.3,0,0.5,1,0,0,0", "1,1.5,0,0.5,1,0,0,0"], "line 3: out of reach of robot panda"),
-        (["0,3,0,0.5,1,0,0,0", "1,0.3,0,0.5,1,0,0,0"], "line 2: out of reach of robot panda"),
+        (["0,0.3,0,0.5,1,0,0,0", "1,1.5,0,0.5,1,0,0,0"], f"line 3: {OUT_OF_REACH}"),
+        (["0,3,0,0.5,1,0,0,0", "1,0.3,0,0.5,1,0,0,0"], f"line 2: {OUT_OF_REACH}"),
         (
             ["0,0.3,0,0.5,1,0,0,0", "1,0.4,0,0.5,1,0,0,0", "2,0.3,0,9,1,0,0,0"],
-            "line 4: out of reach of robot panda",
+            f"line 4: {OUT_OF_REACH}",
         ),
         (["0,0.3,0,0.5,1,0,0,0", "1,0.4,0,0.5,1,0,0,0.5"], "line 3: the quaternion's norm is"),
     ],

@@ -184,7 +184,7 @@ def test_robot_that_would_fall_does_not_certify(monkeypatch: pytest.MonkeyPatch)
     [
         ("speed=1", "speed=1.0 must be 0.05 to 0.9"),
         ("radius=0.3", "radius=0.3 must be 0.02 to 0.15"),
-        ("robot=talos", "unknown parameter of scenario humanoid 'robot'; valid: dt, gain"),
+        ("robot=talos", "robot='talos' is not valid: valid: talos-humanoid"),
     ],
 )
 def test_what_cannot_be_is_one_line(selector: str, words: str) -> None:

@@ -137,7 +137,7 @@ def test_an_approach_without_room_or_without_limit_does_not_certify(
     with pytest.raises(DikbenchError, match="deepest margin of the motion"):
         make_scenario("joint-limit-approach")
     put_robot(monkeypatch, load_robot("ur5"))
-    monkeypatch.setattr(sys.modules["scenarios.joint_limit_approach"], "ROOM", 0.5)
+    monkeypatch.setattr(sys.modules["scenarios.joint_limit_approach"], "BRAKING_DISTANCES", 0.5)
     with pytest.raises(DikbenchError, match="room before the limit over the braking distance"):
         make_scenario("joint-limit-approach[deceleration=2]")
 
