@@ -78,8 +78,8 @@ def solve_dik(
         reference_frame: the axes in which the twist is given, Pinocchio's names.
         gain: of the target, 1/s; default 1/dt (there in one step).
         dt: control period [s].
-        solver: a solver's selector, such as `osqp[eps_abs=1e-6]`; default: daqp, or clarabel for a
-            formulation written in cvxpy. Not used by formulations that need none.
+        solver: a solver's selector, such as `osqp[eps_abs=1e-6]`; default: daqp[then=clarabel],
+            or clarabel for a formulation written in cvxpy. Not used by formulations that need none.
         v_prev: velocity applied in the step before, (nv,); None means no acceleration bound.
         tasks: secondary tasks.
         constraints: what must hold in addition to the limits of the joints.

@@ -84,9 +84,7 @@ def solve_for(formulation: Formulation, solver: str = "daqp") -> CheckedSolve:
     return make_solve(None if program is None else parse_solver(solver), program)
 
 
-def velocity_of(
-    formulation: str | Formulation, problem: DikProblem, solver: str = "daqp"
-) -> Array:
+def velocity_of(formulation: str | Formulation, problem: DikProblem, solver: str = "daqp") -> Array:
     """What a formulation answers; it may raise `CannotAnswer`."""
     law = make_formulation(formulation) if isinstance(formulation, str) else formulation
     solve = solve_for(law, solver)
