@@ -18,7 +18,15 @@ ILL_CONDITIONED = 1e-4
 
 def thin_svd(A: Array) -> tuple[Array, Array, Array]:
     """U (m, k), singular values (k,) falling, V^T (k, n) of A (m, n), k = min(m, n)."""
-    U, singular, Vt, _ = dgesdd(A, full_matrices=0)
+    return _svd(A, 0)
+
+
+def _svd(A: Array, full: int) -> tuple[Array, Array, Array]:
+    """LAPACK's decomposition, NaN where there is none: of a matrix that is not finite."""
+    U, singular, Vt, failed = dgesdd(A, full_matrices=full)
+    if failed:  # LAPACK leaves zeros behind, which would pass for an answer
+        for part in (U, singular, Vt):
+            part.fill(np.nan)
     return U, singular, Vt
 
 
@@ -84,8 +92,8 @@ def null_space(A: Array, tolerance: float) -> Array:
 
     Singular values up to `tolerance` (absolute, in the units of A) are taken as zero.
     """
-    _, singular, Vt, _ = dgesdd(A, full_matrices=1)
-    basis: Array = Vt[int(np.count_nonzero(singular > tolerance)) :].T
+    _, singular, Vt = _svd(A, 1)
+    basis: Array = Vt[rank(singular, tolerance) :].T
     return basis
 
 
@@ -99,7 +107,7 @@ class DampedInverse:
     __slots__ = ("_U", "_Vt", "_damped", "_kept", "_singular")
 
     def __init__(self, A: Array, tolerance: float, damping: float) -> None:
-        self._U, self._singular, self._Vt, _ = dgesdd(A, full_matrices=0)
+        self._U, self._singular, self._Vt = _svd(A, 0)
         self._kept = self._singular > tolerance
         self._damped = self._singular**2 + damping**2
 
@@ -134,10 +142,10 @@ def inverse_and_row_space(A: Array, tolerance: float, damping: float = 0.0) -> t
     Singular values s up to the (absolute) tolerance count as zero, r are above it; their inverse is
     s / (s^2 + damping^2). I - basis^T basis projects onto the null space of A, damped or not.
     """
-    U, singular, Vt, _ = dgesdd(A, full_matrices=0)
-    rank = int((singular > tolerance).sum())
-    kept, basis = singular[:rank], Vt[:rank]
-    inverse: Array = (basis.T * (kept / (kept * kept + damping * damping))) @ U[:, :rank].T
+    U, singular, Vt = _svd(A, 0)
+    k = rank(singular, tolerance)
+    kept, basis = singular[:k], Vt[:k]
+    inverse: Array = (basis.T * (kept / (kept * kept + damping * damping))) @ U[:, :k].T
     return inverse, basis
 
 

@@ -34,7 +34,7 @@ class Status(Enum):
     DIVERGED = ("diverged", "The motion left all bounds; the trial was ended.")
     FORMULATION_ERROR = ("formulation-error", "The law raised an error that is not an answer.")
     WRONG_SHAPE = ("wrong-shape", "The law returned something that is not a vector of nv numbers.")
-    NOT_FINITE = ("not-finite", "The law returned NaN or infinity.")
+    NOT_FINITE = ("not-finite", "The law was given or returned NaN or infinity.")
     TIMEOUT = (
         "timeout",
         "The trial ran out of wall-clock time; lower its size or raise the limit.",

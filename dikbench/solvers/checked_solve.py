@@ -16,7 +16,7 @@ from dikbench.programs.modelled_program import ModelledProgram
 from dikbench.programs.quadratic_program import ProgramKind, QuadraticProgram
 from dikbench.solvers.catalogue.back_ends import Solver
 from dikbench.solvers.catalogue.presets import TOLERANCES
-from dikbench.solvers.recheck.feasibility import is_feasible
+from dikbench.solvers.recheck.feasibility import is_feasible, is_finite
 from dikbench.solvers.recheck.rechecked import RecheckedSteps, Solved
 
 BATCH: Final = 512
@@ -106,6 +106,8 @@ class CheckedSolve:
     def _reason(self, program: QuadraticProgram | ModelledProgram) -> Infeasible | SolverFailed:
         """Why there is no answer; the timing pass does not ask."""
         matrices = program.matrices() if isinstance(program, ModelledProgram) else program
+        if not is_finite(matrices):
+            return SolverFailed("the program holds NaN or infinity")
         if not self._checks or is_feasible(matrices):
             return SolverFailed("the solver gave no answer to a feasible program")
         return Infeasible("the program has no feasible point")

@@ -166,7 +166,7 @@ def fail_most(rows: pd.DataFrame, names: Names) -> Finding:
         counts = failed.groupby(CONTENDER, sort=False).size()
         shares = counts / rows.groupby(CONTENDER, sort=False).size()[counts.index]
         most = _largest(shares)
-        by_status = failed.set_index(CONTENDER).loc[most, "status"].value_counts()
+        by_status = failed.set_index(CONTENDER).loc[most]["status"].value_counts()
         reasons = listed([f"{number} {status}" for status, number in by_status.items()])
         each = " each" if len(most) > 1 else ""
         return Finding(
