@@ -85,6 +85,7 @@ def test_no_formulation_makes_numbers_of_what_is_none(name: str) -> None:
             assert not np.isfinite(v).all(), (place, bad)
 
 
+@pytest.mark.filterwarnings("ignore:overflow")
 def test_an_infinite_bound_and_huge_numbers_are_finite_problems() -> None:
     """An infinite h constrains nothing, and squares that overflow are no infinity."""
     problem = _problem()
