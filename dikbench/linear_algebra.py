@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 from scipy.linalg.lapack import dgeqrf, dgesdd, dposv
+from scipy.optimize import nnls
 
 from dikbench.arrays import Array
 
@@ -14,6 +15,11 @@ Projector = Literal["exact", "damped"]
 
 ILL_CONDITIONED = 1e-4
 """Ratio of the pivots of a Gram matrix's triangle below which it is not to be trusted."""
+
+
+INCONSISTENT = 1e-8
+"""Inequalities of rows of about unit length that can only be met to more than this contradict each
+other."""
 
 
 def thin_svd(A: Array) -> tuple[Array, Array, Array]:
@@ -159,3 +165,25 @@ def volume(A: Array) -> float:
         return 0.0
     R, _, _, _ = dgeqrf(A.T)
     return float(abs(R.diagonal().prod()))
+
+
+def shortest(G: Array, h: Array) -> Array | None:
+    """The shortest x (n,) with G x <= h, for G (p, n), h (p,); None where there is none.
+
+    With u >= 0 the least-squares solution of [-G^T; -h^T] u = (0, ..., 0, 1) and r what is left of
+    it, x_j = -r_j / r_(n+1); r = 0 where no x does it.
+
+    Source: Lawson & Hanson (1974), Solving Least Squares Problems, chapter 23.
+    """
+    n = G.shape[1]
+    E, f = -np.vstack([G.T, h]), np.zeros(n + 1)
+    f[n] = 1.0
+    try:
+        u, _ = nnls(E, f)
+    except RuntimeError:  # it counts its iterations
+        return None
+    left = E @ u - f
+    if -left[n] < INCONSISTENT:
+        return None
+    x: Array = -left[:n] / left[n]
+    return x if (G @ x - h).max(initial=0.0) <= INCONSISTENT else None

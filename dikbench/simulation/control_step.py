@@ -10,10 +10,14 @@ import numpy as np
 
 from dikbench.arrays import Array
 from dikbench.errors import CannotAnswer, Infeasible
+from dikbench.linear_algebra import shortest
 from dikbench.problem.problem import DikProblem, Formulation
 from dikbench.problem.velocity_box import velocity_box
 from dikbench.simulation.status import Status
 from dikbench.solvers.checked_solve import CheckedSolve
+
+KEPT_RAD_S = 1e-9
+"""A row of G v <= h that is passed by less than this [rad/s] is kept."""
 
 FLOATS = np.dtype(float)
 OK = Status.OK  # an attribute of an enumeration costs as much as a small product
@@ -124,7 +128,8 @@ def fallback(problem: DikProblem) -> Array:
     c is the smallest factor in [0, 1] that neither a joint's acceleration limit forbids,
     1 - min_i a_i dt / |v_prev,i|, nor a row of G v <= h (a torque that is not there cannot brake);
     without either, or without v_prev, the robot stops at once (outside a position limit the box
-    then asks for the way back).
+    then asks for the way back). Where that breaks a row, the nearest velocity in the box that keeps
+    all rows is taken; where there is none, the joints' own limits go first and rows are broken.
     """
     box = velocity_box(
         problem.limits, problem.v_prev, problem.dt
@@ -132,7 +137,18 @@ def fallback(problem: DikProblem) -> Array:
     v = np.zeros(problem.robot.nv)
     if problem.v_prev is not None:
         v = _slowest(problem, problem.v_prev) * problem.v_prev
-    return np.clip(v, box.lower, box.upper)
+    v = np.clip(v, box.lower, box.upper)
+    G, h = problem.G, problem.h
+    if G is None or h is None or (G @ v <= h + KEPT_RAD_S).all():
+        return v
+    identity = np.eye(len(v))
+    rows, sides = np.vstack([G, identity, -identity]), np.concatenate([h, box.upper, -box.lower])
+    bounded = sides < np.inf
+    move = shortest(rows[bounded], (sides - rows @ v)[bounded])
+    if move is None:
+        return v
+    nearest: Array = np.clip(v + move, box.lower, box.upper)
+    return nearest
 
 
 def _slowest(problem: DikProblem, v_prev: Array) -> float:
