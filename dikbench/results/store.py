@@ -15,7 +15,7 @@ import pandas as pd
 
 from dikbench.errors import DikbenchError
 from dikbench.metrics import METRICS
-from dikbench.results.columns import KEYS, RENAMED, TIMED, TIMES, TRIAL
+from dikbench.results.columns import KEYS, RENAMED, SEES, TIMED, TIMES, TRIAL
 from dikbench.study.plan import PlannedTrial
 from dikbench.study.trial import Trial
 
@@ -23,7 +23,7 @@ SCHEMA: Final = 2
 """Version of the tables below. A store of version 1, whose times have other names, is renamed when
 it is opened; another one is not read."""
 
-NUMBERS: Final = (*METRICS, "wall_time_s", "control_time_s")
+NUMBERS: Final = (*METRICS, *SEES, "wall_time_s", "control_time_s")
 
 TABLES: Final = f"""
 CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL);

@@ -15,7 +15,7 @@ from dikbench.errors import DikbenchError, unknown
 from dikbench.plugins.building import make_formulation
 from dikbench.problem.constraints import Constraint
 from dikbench.problem.posing import pose_problem
-from dikbench.problem.problem import Formulation, program_of
+from dikbench.problem.problem import Formulation, program_of, refusal_of
 from dikbench.problem.progress import STUCK_PROGRESS, progress, row_weights
 from dikbench.problem.tasks import LinearizedTask, PoseTask, Task
 from dikbench.robots.kinematics import Kinematics
@@ -85,8 +85,8 @@ def solve_dik(
         constraints: what must hold in addition to the limits of the joints.
 
     Raises:
-        DikbenchError: on a wrong name, shape or value, or a formulation that raises, or answers
-            with a wrong shape or NaN.
+        DikbenchError: on a wrong name, shape or value, or a formulation that refuses such a
+            problem, raises, or answers with a wrong shape or NaN.
     """
     if not isinstance(robot, Robot):
         raise DikbenchError(
@@ -117,6 +117,9 @@ def solve_dik(
     else:
         main = _target_task(kinematics, target, 1 / dt if gain is None else gain)
     problem = pose_problem(kinematics, previous, dt, main, tasks, constraints)
+    reason = refusal_of(formulation, problem)
+    if reason:
+        raise DikbenchError(f"formulation {type(formulation).__name__}: {reason}")
     solve = _solve_for(formulation, solver)
     try:
         answer = control_step(formulation, problem, solve)

@@ -13,86 +13,30 @@ with and without a posture task, acceleration limits, rows G v <= h and a motion
 from __future__ import annotations
 
 import pickle
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import is_dataclass
-from typing import Final, NamedTuple, get_args
+from typing import Final, get_args
 
 import numpy as np
 import pinocchio as pin
 
 from dikbench.arrays import Array
-from dikbench.errors import DikbenchError
-from dikbench.problem.problem import DikProblem, Formulation, LimitKind, program_of, promises_of
+from dikbench.problem.problem import (
+    DikProblem,
+    Formulation,
+    LimitKind,
+    ProblemPart,
+    program_of,
+    promises_of,
+    sight_of,
+)
 from dikbench.programs.quadratic_program import ProgramKind
-from dikbench.simulation.control_step import TrialEnded, control_step
 from dikbench.simulation.status import Status
-from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, Solver, parse_solver, why_not
-from dikbench.solvers.checked_solve import make_solve
+from dikbench.testing.asked import ROUNDING, Asked
+from dikbench.testing.sight import check_sight
 from dikbench.testing.states import State, states
 
-ROUNDING: Final = 1e-6
-"""A limit passed by less than this [rad/s], beyond the residual of the solver, is kept."""
-
 Check = Callable[[Formulation, str | None], None]
-
-
-class _Answer(NamedTuple):
-    """What a formulation gave: a velocity, or None and what it did instead; the solver's residual.
-
-    A formulation may solve several programs, each from what the last one gave: their residuals add
-    up.
-    """
-
-    velocity: Array | None
-    status: Status
-    message: str
-    residual: float
-
-
-class _Asked:
-    """A formulation and the solver with which it is checked."""
-
-    def __init__(self, formulation: Formulation, solver: str | None) -> None:
-        self.formulation = formulation
-        self.program = program_of(formulation)
-        self.solver: Solver | None = None
-        if self.program is not None:
-            self.solver = parse_solver(solver or DEFAULT_SOLVER[self.program])
-            reason = why_not(self.solver, self.program)
-            if reason:
-                raise DikbenchError(reason)
-
-    def answer(self, problem: DikProblem) -> _Answer:
-        """Ask the formulation, with a solver that remembers nothing."""
-        solve = make_solve(self.solver, self.program)
-        try:
-            answer = control_step(self.formulation, problem, solve)
-        except TrialEnded as ended:
-            return _Answer(None, ended.status, str(ended), 0.0)
-        if answer.status in {Status.INFEASIBLE, Status.SOLVER_FAILED}:
-            return _Answer(None, answer.status, answer.status.sentence, 0.0)
-        rechecked = solve.rechecked()
-        status = Status.NOT_VERIFIED if rechecked.lied[0] else answer.status
-        residual = solve.calls * float(rechecked.primal[0])
-        return _Answer(answer.velocity, status, status.sentence, residual)
-
-    def verified(self) -> Iterator[tuple[State, Array, float]]:
-        """Yield every state with a verified answer: state, velocity, tolerance [rad/s].
-
-        A formulation may have no answer at some states, and a solver may be wrong at some, but not
-        at all of them.
-        """
-        answered = False
-        why = ""
-        for state in states():
-            answer = self.answer(state.problem)
-            if answer.velocity is not None and answer.status is Status.OK:
-                answered = True
-                yield state, answer.velocity, ROUNDING + answer.residual
-            else:
-                why = f"{state.label}: {answer.status.value}: {answer.message}"
-        if not answered:
-            raise AssertionError(f"no answer at any state; the last one, {why}")
 
 
 def check_declaration(formulation: Formulation, solver: str | None = None) -> None:
@@ -108,11 +52,15 @@ def check_declaration(formulation: Formulation, solver: str | None = None) -> No
     if wrong:
         valid = ", ".join(get_args(LimitKind))
         raise AssertionError(f"{name}.keeps holds {sorted(wrong)}; valid: {valid}")
+    strange = sight_of(formulation) - set(get_args(ProblemPart))
+    if strange:
+        valid = ", ".join(get_args(ProblemPart))
+        raise AssertionError(f"{name}.sees holds {sorted(strange)}; valid: {valid}")
 
 
 def check_raises_only_cannot_answer(formulation: Formulation, solver: str | None = None) -> None:
     """Check that the formulation answers or raises `CannotAnswer`, and answers somewhere."""
-    asked = _Asked(formulation, solver)
+    asked = Asked(formulation, solver)
     for state in states():
         answer = asked.answer(state.problem)
         if answer.status is Status.FORMULATION_ERROR:
@@ -123,7 +71,7 @@ def check_raises_only_cannot_answer(formulation: Formulation, solver: str | None
 
 def check_shape(formulation: Formulation, solver: str | None = None) -> None:
     """Check that the velocity is an array of nv floats."""
-    asked = _Asked(formulation, solver)
+    asked = Asked(formulation, solver)
     for state in states():
         answer = asked.answer(state.problem)
         if answer.status is Status.WRONG_SHAPE:
@@ -134,7 +82,7 @@ def check_shape(formulation: Formulation, solver: str | None = None) -> None:
 
 def check_finite(formulation: Formulation, solver: str | None = None) -> None:
     """Check that the velocity holds neither NaN nor infinity."""
-    asked = _Asked(formulation, solver)
+    asked = Asked(formulation, solver)
     for state in states():
         answer = asked.answer(state.problem)
         if answer.status is Status.NOT_FINITE:
@@ -143,7 +91,7 @@ def check_finite(formulation: Formulation, solver: str | None = None) -> None:
 
 def check_inputs_untouched(formulation: Formulation, solver: str | None = None) -> None:
     """Check that the formulation leaves everything that it was handed as it was."""
-    asked = _Asked(formulation, solver)
+    asked = Asked(formulation, solver)
     for state in states():
         before = {name: np.array(value) for name, value in _inputs(state.problem).items()}
         asked.answer(state.problem)
@@ -180,7 +128,7 @@ def _inputs(problem: DikProblem) -> dict[str, Array | float]:
 
 def check_repeatable(formulation: Formulation, solver: str | None = None) -> None:
     """Check that the same problem gives the same velocity to the bit, whatever came in between."""
-    _compare(_Asked(formulation, solver), _Asked(formulation, solver), "asked again")
+    _compare(Asked(formulation, solver), Asked(formulation, solver), "asked again")
 
 
 def check_picklable(formulation: Formulation, solver: str | None = None) -> None:
@@ -192,10 +140,10 @@ def check_picklable(formulation: Formulation, solver: str | None = None) -> None
             f"{type(formulation).__name__} cannot be pickled ({error}); workers are processes: "
             "define the class at the top of a module, with parameters that pickle"
         ) from error
-    _compare(_Asked(formulation, solver), _Asked(unpickled, solver), "unpickled")
+    _compare(Asked(formulation, solver), Asked(unpickled, solver), "unpickled")
 
 
-def _compare(first: _Asked, second: _Asked, what: str) -> None:
+def _compare(first: Asked, second: Asked, what: str) -> None:
     """Ask one forwards through the states, the other backwards, with other scratch data."""
     velocities = [first.answer(state.problem).velocity for state in states()]
     for v, state in reversed([*zip(velocities, states(), strict=True)]):
@@ -229,7 +177,7 @@ def check_inequalities(formulation: Formulation, solver: str | None = None) -> N
 
 def _check_promise(kind: LimitKind, formulation: Formulation, solver: str | None) -> None:
     if kind in promises_of(formulation):
-        for state, v, tolerance in _Asked(formulation, solver).verified():
+        for state, v, tolerance in Asked(formulation, solver).verified():
             assert_within(state, kind, v, tolerance)
 
 
@@ -288,7 +236,7 @@ def check_state(formulation: Formulation, state: State, solver: str | None = Non
         AssertionError: if the formulation raises, answers with a wrong shape or NaN, or breaks a
             promise.
     """
-    answer = _Asked(formulation, solver).answer(state.problem)
+    answer = Asked(formulation, solver).answer(state.problem)
     if answer.status in {Status.FORMULATION_ERROR, Status.WRONG_SHAPE, Status.NOT_FINITE}:
         raise AssertionError(f"{state.label}: {answer.status.value}: {answer.message}")
     if answer.velocity is not None and answer.status is Status.OK:
@@ -298,6 +246,7 @@ def check_state(formulation: Formulation, state: State, solver: str | None = Non
 
 CHECKS: Final[tuple[Check, ...]] = (
     check_declaration,
+    check_sight,
     check_raises_only_cannot_answer,
     check_shape,
     check_finite,

@@ -1,0 +1,77 @@
+"""Asking a formulation at the control steps of the contract."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final, NamedTuple
+
+from dikbench.arrays import Array
+from dikbench.errors import DikbenchError
+from dikbench.problem.problem import DikProblem, Formulation, program_of
+from dikbench.simulation.control_step import TrialEnded, control_step
+from dikbench.simulation.status import Status
+from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, Solver, parse_solver, why_not
+from dikbench.solvers.checked_solve import make_solve
+from dikbench.testing.states import State, states
+
+ROUNDING: Final = 1e-6
+"""A limit passed by less than this [rad/s], beyond the residual of the solver, is kept."""
+
+
+class Answer(NamedTuple):
+    """What a formulation gave: a velocity, or None and what it did instead; the solver's residual.
+
+    A formulation may solve several programs, each from what the last one gave: their residuals add
+    up.
+    """
+
+    velocity: Array | None
+    status: Status
+    message: str
+    residual: float
+
+
+class Asked:
+    """A formulation and the solver with which it is checked."""
+
+    def __init__(self, formulation: Formulation, solver: str | None) -> None:
+        self.formulation = formulation
+        self.program = program_of(formulation)
+        self.solver: Solver | None = None
+        if self.program is not None:
+            self.solver = parse_solver(solver or DEFAULT_SOLVER[self.program])
+            reason = why_not(self.solver, self.program)
+            if reason:
+                raise DikbenchError(reason)
+
+    def answer(self, problem: DikProblem) -> Answer:
+        """Ask the formulation, with a solver that remembers nothing."""
+        solve = make_solve(self.solver, self.program)
+        try:
+            answer = control_step(self.formulation, problem, solve)
+        except TrialEnded as ended:
+            return Answer(None, ended.status, str(ended), 0.0)
+        if answer.status in {Status.INFEASIBLE, Status.SOLVER_FAILED}:
+            return Answer(None, answer.status, answer.status.sentence, 0.0)
+        rechecked = solve.rechecked()
+        status = Status.NOT_VERIFIED if rechecked.lied[0] else answer.status
+        residual = solve.calls * float(rechecked.primal[0])
+        return Answer(answer.velocity, status, status.sentence, residual)
+
+    def verified(self) -> Iterator[tuple[State, Array, float]]:
+        """Yield every state with a verified answer: state, velocity, tolerance [rad/s].
+
+        A formulation may have no answer at some states, and a solver may be wrong at some, but not
+        at all of them.
+        """
+        answered = False
+        why = ""
+        for state in states():
+            answer = self.answer(state.problem)
+            if answer.velocity is not None and answer.status is Status.OK:
+                answered = True
+                yield state, answer.velocity, ROUNDING + answer.residual
+            else:
+                why = f"{state.label}: {answer.status.value}: {answer.message}"
+        if not answered:
+            raise AssertionError(f"no answer at any state; the last one, {why}")
