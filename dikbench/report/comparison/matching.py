@@ -123,9 +123,8 @@ def _in_the_words_of(a: pd.DataFrame, b: pd.DataFrame) -> pd.DataFrame:
         return b
     words = a.drop_duplicates("id").set_index("id")[TRIAL]
     same = b["id"].isin(words.index)
-    renamed = b.copy()
-    renamed.loc[same, TRIAL] = words.loc[b.loc[same, "id"]].to_numpy()
-    return renamed.astype({"seed": b["seed"].dtype})
+    renamed = {name: b["id"].map(words[name]).where(same, b[name]) for name in TRIAL}
+    return b.assign(**renamed).astype({"seed": b["seed"].dtype})
 
 
 def trial_name(row: Mapping[Any, Any]) -> str:

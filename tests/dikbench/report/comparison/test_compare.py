@@ -224,7 +224,9 @@ def test_what_cannot_be_compared(folder: Callable[..., Path], tmp_path: Path) ->
     a = folder("a")
     others = {
         tmp_path: "no results in",
-        folder("seeds", lambda t: t.assign(seed=t["seed"] + 7)): "have no trial in common",
+        folder("seeds", lambda t: t.assign(seed=t["seed"] + 7, id=t["id"] + "7")): (
+            "have no trial in common"
+        ),
         folder("twice", lambda t: pd.concat([t, t])): "holds a trial twice: dls on reach",
         folder("empty", lambda t: t.head(0)): "holds no trials",
         folder("bare", lambda t: t.drop(columns=[*METRICS])): "have no metric in common",
