@@ -16,7 +16,7 @@ from dikbench.report.drawing.style import COLOURS, WIDTH, save, short
 PARTS: Final = MappingProxyType(
     {
         "kinematics_time_median_us": ("kinematics and tasks", "0.75"),
-        "formulation_own_time_median_us": ("contender", COLOURS[0]),
+        "formulation_own_time_median_us": ("formulation", COLOURS[0]),
         "solver_core_time_median_us": ("solver: the library's call", COLOURS[1]),
         "solver_wrapper_time_median_us": ("solver: what wraps it", COLOURS[5]),
     }

@@ -46,7 +46,7 @@ def _block(table: Table, block: Block) -> str:
     rows = sorted(block.rows, key=lambda row: (row.cells[0].value, *_last_if_nan(row.cells[first])))
     top = rows[:ROWS]
     columns = [
-        ["contender", *(_name(row) for row in top)],
+        ["formulation", *(_name(row) for row in top)],
         ["failed", *(f"{row.cells[1].value:.0f}/{row.cells[2].value:.0f}" for row in top)],
     ]
     for place in numbers:
