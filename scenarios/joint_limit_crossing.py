@@ -94,7 +94,7 @@ class JointLimitCrossing(Family):
         """See `Family`."""
         position, velocity = robot.limits.position, robot.limits.velocity
         if position is None or velocity is None:
-            raise DikbenchError(f"robot {self.robot} has no limits")
+            raise DikbenchError(f"robot {self.robot} has no position limits")
         where = CROSSINGS[self.robot]
         j = where.joint
         start = change.posture(robot, np.array(where.posture), (j,))
