@@ -13,9 +13,9 @@ from dikbench.errors import DikbenchError, unknown
 from dikbench.parameters import Range
 from dikbench.report.write import write_report
 from dikbench.results.reading import Results, load_results
+from dikbench.run import runner
 from dikbench.run.pool import available_cores
 from dikbench.run.runner import RunSettings
-from dikbench.run.runner import run_study as run_selected
 from dikbench.run.trial_row import TracePolicy
 from dikbench.scenario.plant import REFERENCE_MODES
 from dikbench.study.study import DEFAULT_STUDY, Selection, Study, load_study, select
@@ -94,7 +94,7 @@ def run_study(
     settings = RunSettings(jobs or available_cores(), trial_timeout, trial_memory, traces, rerun)
     folder = results_folder(chosen, out)
     given = {axis: found for axis, found in asdict(selection).items() if found}
-    run_selected(chosen, folder, settings, f"dikbench.run_study({study!r}, **{given})")
+    runner.run_study(chosen, folder, settings, f"dikbench.run_study({study!r}, **{given})")
     if report:
         write_report(folder)
     return load_results(folder)
