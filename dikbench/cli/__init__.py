@@ -31,6 +31,11 @@ def main() -> None:
     except click.Abort:
         click.echo("interrupted", err=True)
         sys.exit(130)
+    except ValueError as error:
+        if "null byte" not in str(error):
+            raise
+        click.echo("error: a path holds a null byte; valid: any other characters", err=True)
+        sys.exit(2)
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
