@@ -80,7 +80,7 @@ class HoldStill(Family):
 
     Provokes: drift and chatter, given a plant with noise or delay
 
-    Shows in: velocity_peak_ratio, joint_travel_rad, off_course_max_rad
+    Shows in: velocity_peak_ratio, joint_travel_rad, direction_error_max_rad
 
     Attributes:
         robot: one of these robots.

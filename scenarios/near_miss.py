@@ -78,7 +78,7 @@ class NearMiss(Family):
 
     Provokes: joint speeds beyond the limits near a singularity
 
-    Shows in: velocity_peak_ratio, off_course_max_rad, progress_min
+    Shows in: velocity_peak_ratio, direction_error_max_rad, progress_min
 
     Attributes:
         singularity: wrist, elbow or shoulder, where the robot's are known; auto: the first known

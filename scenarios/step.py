@@ -54,7 +54,7 @@ class Step(Family):
 
     Provokes: an error that requires joint speeds beyond the limits at once
 
-    Shows in: off_course_max_rad, velocity_violation_max_rad_s, progress_min
+    Shows in: direction_error_max_rad, velocity_violation_max_rad_s, progress_min
 
     Attributes:
         robot: one of the arms in space.

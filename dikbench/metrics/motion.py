@@ -7,13 +7,14 @@ from functools import cached_property
 
 import numpy as np
 
-from dikbench.arrays import Array
-from dikbench.metrics.along_path import follow_path
+from dikbench.arrays import Array, Indices
+from dikbench.metrics.along_path import AlongPath
 from dikbench.problem.constraints import CollisionConstraint, TorqueConstraint
 from dikbench.problem.progress import progress, row_weights
 from dikbench.problem.tasks import PostureTask
-from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.kinematics import Kinematics, placements
 from dikbench.robots.limits import Interval
+from dikbench.scenario.reference.path import NEGLIGIBLE_LENGTH_M
 from dikbench.scenario.scenario import Scenario
 from dikbench.simulation.trace import Trace
 
@@ -31,6 +32,8 @@ class Motion:
         orientation_error: angle between them, (n + 1,) [rad]; NaN where the task is about the
             position only.
         jacobians: task Jacobians (m, rad), (n + 1, m, nv).
+        points: placements of the task frame as points, (n + 1, d) [m] (see `Embedding`).
+        target_points: those of its target, (n + 1, d) [m].
     """
 
     trace: Trace
@@ -39,6 +42,8 @@ class Motion:
     position_error: Array
     orientation_error: Array
     jacobians: Array
+    points: Array
+    target_points: Array
 
     @cached_property
     def achieved(self) -> Array:
@@ -97,40 +102,61 @@ class Motion:
         return path.distances(self.translations)
 
     @cached_property
-    def path_covered(self) -> Array:
-        """Path length from the start to the point where the frame is, (n + 1,) [m].
+    def tracking_error(self) -> Array:
+        """Distance from the target in position and orientation, (n + 1,) [m] (see `Embedding`).
 
-        It never decreases (see `follow_path`); empty where the target has no path or stays at a
-        point, or the task is about the orientation only.
+        Of several frames of the first priority the one that is farthest from its target counts.
         """
-        path, tau = self.scenario.path, self.trace.tau
-        if path is None or path.is_point or np.isnan(self.position_error[0]):
-            return np.empty(0)
-        return follow_path(path, self.translations, np.interp(tau, path.times, path.arcs))
+        away = np.linalg.norm(self.points - self.target_points, axis=1)
+        farthest: Array = np.maximum(away, self._held_apart[0])
+        return farthest
 
     @cached_property
-    def path_done(self) -> float:
-        """Share of the path that lies behind the frame at the end; NaN where there is none."""
-        path, covered = self.scenario.path, self.path_covered
-        return float(covered[-1] / path.arcs[-1]) if path and len(covered) else np.nan
+    def contour_error_6d(self) -> Array:
+        """Distance from the path in position and orientation, (n + 1,) [m] (see `Embedding`).
+
+        The nearest point of the whole path counts, whenever the reference is there. Of a target
+        without a path it is the distance from the target.
+        """
+        path = self.scenario.embedded_path
+        if path is None:
+            return self.tracking_error
+        away: Array = np.maximum(self.nearest_on_path[0], self._held_apart[0])
+        return away
 
     @cached_property
-    def lag(self) -> Array:
-        """Delay along the path, (n + 1,) [s].
+    def nearest_on_path(self) -> tuple[Array, Indices, Array]:
+        """See `EmbeddedPath.nearest`: of the task frame, at every instant."""
+        path = self.scenario.embedded_path
+        assert path is not None
+        return path.nearest(self.points)
 
-        The nominal time that the reference takes from the nearest point of the path (see
-        `follow_path`) to the target, without dwells, in which there is nothing to catch up; plus,
-        as a path-indexed target waits, the delay of the target itself: trace time - tau, 0 where
-        the reference moves with the clock. Where the reference is slow, a small distance is a long
-        delay. NaN where `path_covered` is empty.
+    @cached_property
+    def along_path(self) -> AlongPath | None:
+        """How it follows the path; None of a target without a path, or whose path is a point."""
+        path, scenario = self.scenario.embedded_path, self.scenario
+        if path is None or path.arcs[-1] <= NEGLIGIBLE_LENGTH_M:
+            return None
+        return AlongPath(path, self.trace, scenario, self.points, self._held_apart[1])
+
+    @cached_property
+    def _held_apart(self) -> tuple[Array, Array]:
+        """How far held frames are from their targets, (n + 1,) [m] each.
+
+        At the instants, and in the segments that lead to them.
         """
-        path, tau = self.scenario.path, self.trace.tau
-        if path is None or not len(self.path_covered):
-            return np.full(len(tau), np.nan)
-        target = np.interp(tau, path.times, path.moving_times)
-        behind = target - np.interp(self.path_covered, path.arcs, path.moving_times)
-        lag: Array = np.maximum(behind, 0.0) + (self.trace.dt * np.arange(len(tau)) - tau)
-        return lag
+        apart = np.zeros((2, self.trace.steps + 1))
+        for held in self.scenario.held_frames:
+            X = placements(self.scenario.robot, held.frame, self.trace.q)
+            away = held.embedding.points(X[:, :3, :3], X[:, :3, 3]) - held.target
+            ways = np.diff(away, axis=0)
+            squares = np.einsum("ij,ij->i", ways, ways)
+            along = np.einsum("ij,ij->i", -away[:-1], ways)
+            share = np.clip(along / np.where(squares > 0, squares, 1.0), 0.0, 1.0)
+            between = away.copy()
+            between[1:] = away[:-1] + share[:, None] * ways
+            apart = np.maximum(apart, np.linalg.norm([away, between], axis=2))
+        return apart[0], apart[1]
 
     @cached_property
     def second_task_error(self) -> Array:

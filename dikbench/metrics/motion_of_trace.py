@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 
 from dikbench.arrays import Array
 from dikbench.metrics.motion import Motion
-from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.kinematics import Kinematics, placements
 from dikbench.scenario.scenario import Scenario
 from dikbench.simulation.trace import Trace
 
@@ -22,13 +21,8 @@ def motion_of(trace: Trace, scenario: Scenario, jacobians: Array | None = None) 
             computed them; otherwise they are computed, with the same result.
     """
     robot, frame = scenario.robot, scenario.robot.frame_id
-    model, data, n = robot.model, robot.model.createData(), trace.steps
-    rows = np.array(scenario.rows)
-    placements = []
-    for q in trace.q:
-        pin.forwardKinematics(model, data, q)
-        placements.append(pin.updateFramePlacement(model, data, frame).homogeneous)
-    X = np.array(placements)
+    n, rows = trace.steps, np.array(scenario.rows)
+    X = placements(robot, frame, trace.q)
     kinematics, J = Kinematics(robot), np.empty((n + 1, len(rows), robot.nv))
     known = 0 if jacobians is None else n
     if jacobians is not None:
@@ -52,6 +46,8 @@ def motion_of(trace: Trace, scenario: Scenario, jacobians: Array | None = None) 
             else np.full(n + 1, np.nan)
         ),
         jacobians=J,
+        points=scenario.embedding.points(X[:, :3, :3], X[:, :3, 3]),
+        target_points=scenario.embedding.points(target_rotations, target_translations),
     )
 
 

@@ -44,7 +44,7 @@ TIMES: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
 )
 """Columns of the timing pass: type in the store, and definition."""
 
-RENAMED: Final[Mapping[str, str]] = MappingProxyType(
+RENAMED_TIMES: Final[Mapping[str, str]] = MappingProxyType(
     {
         **{
             name.replace("formulation", "law", 1): name
@@ -54,7 +54,18 @@ RENAMED: Final[Mapping[str, str]] = MappingProxyType(
         "timing_verdict": "timing_stability",
     }
 )
+"""Columns of times of older results, and their names today."""
+
+RENAMED_METRICS: Final[Mapping[str, str]] = MappingProxyType(
+    {"off_course_max_rad": "direction_error_max_rad"}
+)
+"""Metrics of older results, and their names today."""
+
+RENAMED: Final[Mapping[str, str]] = MappingProxyType({**RENAMED_TIMES, **RENAMED_METRICS})
 """Columns of older results, and their names today."""
+
+REDEFINED: Final = ("path_done_share", "lag_max_s", "lag_final_s")
+"""Metrics that version 0.1 took of the position alone: what it stored of them is not read."""
 
 DESCRIBED: Final = MappingProxyType(
     {

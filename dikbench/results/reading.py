@@ -200,7 +200,8 @@ def _complete(rows: pd.DataFrame, notes: list[str]) -> pd.DataFrame:
             f"{count} {'row' if count == 1 else 'rows'} without a seed, steps or a selector that "
             "can be read left out."
         )
-    return found[whole].astype({"seed": int, "steps": int}).reset_index(drop=True)
+    typed = found[whole].astype({"seed": int, "steps": int}).reset_index(drop=True)
+    return typed.copy()  # astype leaves every column on its own, which pandas warns about
 
 
 def _named(rows: pd.DataFrame) -> pd.Series:

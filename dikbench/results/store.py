@@ -15,15 +15,23 @@ import pandas as pd
 
 from dikbench.errors import DikbenchError
 from dikbench.metrics import METRICS
-from dikbench.results.columns import KEYS, RENAMED, TIMED, TIMES, TRIAL
+from dikbench.results.columns import (
+    KEYS,
+    REDEFINED,
+    RENAMED_METRICS,
+    RENAMED_TIMES,
+    TIMED,
+    TIMES,
+    TRIAL,
+)
 from dikbench.scenario.oracle import ORACLE
 from dikbench.study.identity import timing_id
 from dikbench.study.plan import PlannedTrial
 from dikbench.study.trial import Trial
 
-SCHEMA_VERSION: Final = 2
-"""Version of the tables below. Times of a store of version 1 are renamed when it is opened; other
-versions are refused."""
+SCHEMA_VERSION: Final = 3
+"""Version of the tables below. Stores of versions 1 and 2 are brought to it when they are opened;
+other versions are refused."""
 
 NUMBERS: Final = (*METRICS, "wall_time_s", "control_time_s")
 
@@ -303,26 +311,37 @@ class Store:
             columns = [row[1] for row in self._database.execute("PRAGMA table_info(trials)")]
         except sqlite3.DatabaseError as error:
             raise DikbenchError(f"store {self.path}: not a store of dikbench: {error}") from None
-        if found.get("schema") not in ("1", str(SCHEMA_VERSION)):
+        if found.get("schema") not in ("1", "2", str(SCHEMA_VERSION)):
             raise OtherVersion(
                 f"store {self.path}: schema version {found.get('schema')!r} is not known; this "
-                f"dikbench reads versions 1 and {SCHEMA_VERSION}"
+                f"dikbench reads versions 1 to {SCHEMA_VERSION}"
             )
-        missing = [name for name in NUMBERS if name not in columns]
+        named_today = {RENAMED_METRICS.get(name, name) for name in columns}
+        missing = [name for name in NUMBERS if name not in named_today]
         if missing and not add_metrics:
             raise OtherVersion(
                 f"store {self.path}: written by a dikbench with other metrics (it lacks "
                 f"{min(missing)!r}); choose another folder, or add them with `dikbench recompute`"
             )
-        if found["schema"] == "1":
-            self._rename_times()
+        if found["schema"] != str(SCHEMA_VERSION):
+            self._migrate(columns, times=found["schema"] == "1")
         for name in missing:
             self._database.execute(f"ALTER TABLE trials ADD COLUMN {name} REAL")
 
-    def _rename_times(self) -> None:
-        """Rename the columns of times of version 1."""
+    def _migrate(self, columns: Sequence[str], *, times: bool) -> None:
+        """Bring the tables of an earlier version, with these columns of trials, to today's.
+
+        Metrics and, of version 1, times are renamed; values of metrics that have another definition
+        today are deleted, to be recomputed.
+        """
+        renamed = {old: new for old, new in RENAMED_METRICS.items() if old in columns}
         with self._guarded(), self._transaction():
-            for old, new in RENAMED.items():
+            for old, new in renamed.items():
+                self._database.execute(f"ALTER TABLE trials RENAME COLUMN {old} TO {new}")
+            for name in REDEFINED:
+                if name in columns:
+                    self._database.execute(f"UPDATE trials SET {name} = NULL")
+            for old, new in RENAMED_TIMES.items() if times else ():
                 self._database.execute(f"ALTER TABLE times RENAME COLUMN {old} TO {new}")
             self._database.execute(
                 "UPDATE meta SET value = ? WHERE key = 'schema'", [str(SCHEMA_VERSION)]

@@ -21,7 +21,7 @@ from dikbench.scenario.building import (
 from dikbench.scenario.certificate import Certificate, Claim
 from dikbench.scenario.oracle import POSE, OracleMotion, oracle_motion
 from dikbench.scenario.reference.reference import Reference
-from dikbench.scenario.scenario import Scenario, first_level
+from dikbench.scenario.scenario import Judged, Scenario, first_level
 from dikbench.scenario.variation import NO_VARIATION, Perturbation, Variation
 
 Gain = Annotated[float, Range(above=0.0, unit="1/s")]
@@ -78,6 +78,7 @@ class Family(Parameters, ABC):
         variation: the ranges of what a seed perturbs.
         grid: the two parameters of a phase diagram, horizontal and vertical.
         about_position_limits: whether figures show the distance to the position limits.
+        tolerance_m, judged, longest_path_run: see `Scenario`.
     """
 
     robot: str = "panda"
@@ -90,6 +91,9 @@ class Family(Parameters, ABC):
     variation: ClassVar[Variation] = NO_VARIATION
     grid: ClassVar[tuple[str, str] | None] = None
     about_position_limits: ClassVar[bool] = False
+    tolerance_m: ClassVar[float] = 0.005
+    judged: ClassVar[Judged] = "path"
+    longest_path_run: ClassVar[float] = 5.0
 
     @abstractmethod
     def case(self, robot: Robot, change: Perturbation) -> Case:
@@ -134,6 +138,9 @@ class Family(Parameters, ABC):
             motion=case.motion,
             variation=self.variation,
             constraints=case.constraints,
+            tolerance_m=self.tolerance_m,
+            judged=self.judged,
+            longest_path_run=self.longest_path_run,
         )
         made.certificate.check(type(self).__name__)
         return made

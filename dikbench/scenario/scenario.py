@@ -4,21 +4,27 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pinocchio as pin
 
 from dikbench.arrays import Array
 from dikbench.problem.constraints import Constraint
+from dikbench.problem.embedding import Embedding, embedding_of
 from dikbench.problem.tasks import Task, TrackingTask, TrackingTogether
 from dikbench.robots.robot import Robot
 from dikbench.scenario.certificate import Certificate
+from dikbench.scenario.held_frame import HeldFrame, held_frames
 from dikbench.scenario.oracle import OracleMotion, follow
+from dikbench.scenario.reference.embedded_path import EmbeddedPath, embedded_path
 from dikbench.scenario.reference.path import ReferencePath, reference_path
 from dikbench.scenario.reference.reference import Reference
 from dikbench.scenario.steps import steps_in
 from dikbench.scenario.variation import NO_VARIATION, Variation
+
+Judged = Literal["path", "end"]
+"""What of a motion is judged: its whole way, or where it ends."""
 
 
 def first_level(tracking: TrackingTask, tasks: tuple[Task, ...]) -> TrackingTask:
@@ -46,6 +52,11 @@ class Scenario:
             measured, from q0 on; None where no joint motion follows the reference.
         variation: the ranges of what a seed perturbs.
         constraints: conditions in addition to the joint limits.
+        tolerance_m: distance from the path, and from the target at the end, up to which the task
+            counts as done [m] (see `Embedding`).
+        judged: whether the whole path is judged, or the end alone.
+        longest_path_run: nominal durations after which a path-indexed run ends, if not with its
+            path before.
     """
 
     robot: Robot
@@ -60,6 +71,9 @@ class Scenario:
     motion: OracleMotion | None = None
     variation: Variation = NO_VARIATION
     constraints: tuple[Constraint, ...] = ()
+    tolerance_m: float = 0.005
+    judged: Judged = "path"
+    longest_path_run: float = 5.0
 
     def __post_init__(self) -> None:
         """Check the number of control steps (see `steps_in`)."""
@@ -105,6 +119,24 @@ class Scenario:
             return None
         end = max(self.reference.duration, self.steps * self.dt)
         return reference_path(self.reference, end, self.dt)
+
+    @cached_property
+    def embedding(self) -> Embedding:
+        """Maps placements of the task frame to points, by what is tracked of them."""
+        start = self.reference.placement(0.0).rotation
+        return embedding_of(self.tracking, self.robot, start)
+
+    @cached_property
+    def embedded_path(self) -> EmbeddedPath | None:
+        """The path of the reference in position and orientation; None for a target at rest."""
+        if not self.reference.moving:
+            return None
+        return embedded_path(self.reference, self.embedding, self.steps * self.dt, self.dt)
+
+    @cached_property
+    def held_frames(self) -> tuple[HeldFrame, ...]:
+        """The other frames whose tasks are of the priority of the tracking."""
+        return held_frames(self.robot, self.tracking, self.tasks)
 
     @cached_property
     def oracle(self) -> Array | None:

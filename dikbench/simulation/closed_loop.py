@@ -76,7 +76,7 @@ def simulate(
         formulation: the formulation under test.
         solve: its solver.
         plant: the measurement and the drive.
-        mode: whether the reference advances with the clock or with the progress achieved.
+        mode: whether the reference advances with the clock or waits for the robot.
         seed: seed of the plant's noise.
 
     Returns:
@@ -118,16 +118,21 @@ def simulate(
             steps.append(
                 (q, clock.tau, desired, jacobian, v, applied, answer.status, problem.relaxed)
             )
-            clock.advance(desired, jacobian, applied)
             q, v_prev = read_only(pin.integrate(model, q, applied * dt)), applied
+            clock.advance(q)
     except TrialEnded as ended:
         status, message = ended.status, f"step {len(steps)}: {ended}"
-    trace, jacobians = _recorded(scenario, steps, q, clock.tau, solve.rechecked())
+    trace, jacobians = _recorded(scenario, steps, q, clock.tau, solve.rechecked(), mode)
     return Run(trace, status, message, kinematics_ns, formulation_ns, jacobians)
 
 
 def _recorded(
-    scenario: Scenario, steps: list[_Step], q: Array, tau: float, rechecked: RecheckedSteps
+    scenario: Scenario,
+    steps: list[_Step],
+    q: Array,
+    tau: float,
+    rechecked: RecheckedSteps,
+    mode: ReferenceMode,
 ) -> tuple[Trace, Array]:
     """Make the trace and the Jacobians (n, m, nv) of steps that ended in q at tau.
 
@@ -159,6 +164,7 @@ def _recorded(
         rechecked.dual[:n],
         rechecked.gap[:n],
         rechecked.distance[:n],
+        mode,
     )
     return trace, jacobians
 

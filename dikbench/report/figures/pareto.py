@@ -58,7 +58,7 @@ def draw_off_course_and_slow_down(ran: pd.DataFrame, target: Path) -> list[Figur
 def contender_points(rows: pd.DataFrame) -> pd.DataFrame:
     """The means of each formulation: `off_course` [deg], `slow_down` [%], and `violating`."""
     ended = rows["status"].eq("ok")
-    off_course = np.degrees(rows["off_course_max_rad"]).where(ended, 180.0)
+    off_course = np.degrees(rows["direction_error_max_rad"]).where(ended, 180.0)
     slow_down = (100.0 * (1.0 - rows["progress_mean"])).clip(0.0, 100.0).where(ended, 100.0)
     table = pd.DataFrame(
         {

@@ -25,7 +25,7 @@ def categories(rows: pd.DataFrame) -> pd.Series:
     conditions = [
         rows["status"].ne("ok"),
         rows["violating_share"].gt(VIOLATING),
-        rows["off_course_max_rad"].gt(OFF_COURSE),
+        rows["direction_error_max_rad"].gt(OFF_COURSE),
         rows["progress_min"].lt(SLOW),
     ]
     return pd.Series(np.select(conditions, [4, 3, 2, 1], default=0), index=rows.index)

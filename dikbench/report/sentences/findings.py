@@ -128,7 +128,7 @@ def keep_limits(rows: pd.DataFrame, names: Names) -> Finding:
 def stay_on_course(rows: pd.DataFrame, names: Names) -> Finding:
     """Who slows down rather than leave the wanted direction, and who of them gets on best."""
     question = "Stays on course"
-    worst = rows.groupby(CONTENDER, sort=False)["off_course_max_rad"].max()
+    worst = rows.groupby(CONTENDER, sort=False)["direction_error_max_rad"].max()
     ran = [contender for contender in candidates(rows) if not math.isnan(worst[contender])]
     if not ran:
         return Finding(question, f"{NOBODY} went through all trials with answers to be trusted.")

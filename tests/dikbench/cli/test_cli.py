@@ -99,7 +99,7 @@ SHOWN = {
     "dls": "damping = 0.05: finite and at least 0  (tuned: 0.001 to 0.3, logarithmic)",
     "osqp": "eps_abs",
     "panda": "panda_hand_tcp",
-    "off_course_max_rad": "unit: rad",
+    "direction_error_max_rad": "unit: rad",
     "quick": "[[cells]]",
 }
 

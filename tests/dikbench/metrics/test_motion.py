@@ -18,7 +18,9 @@ from dikbench.metrics.motion_of_trace import rotation_angles
 def _sigma_min(jacobians: Array) -> float:
     """That of a motion of which nothing but the Jacobians is known."""
     nothing = cast(Any, None)
-    return Motion(nothing, nothing, nothing, nothing, nothing, jacobians).sigma_min
+    return Motion(
+        nothing, nothing, nothing, nothing, nothing, jacobians, nothing, nothing
+    ).sigma_min
 
 
 def _expected(jacobians: Array) -> float:

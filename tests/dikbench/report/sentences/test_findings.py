@@ -158,8 +158,8 @@ def test_who_stays_on_course_and_who_of_them_gets_on() -> None:
         {
             "exact": TOO_FAST,
             "slow": {"progress_mean": 0.4},
-            "less slow": {"progress_mean": 0.8, "off_course_max_rad": math.radians(0.9)},
-            "astray": {"off_course_max_rad": [0.0, 0.0, 1.0]},
+            "less slow": {"progress_mean": 0.8, "direction_error_max_rad": math.radians(0.9)},
+            "astray": {"direction_error_max_rad": [0.0, 0.0, 1.0]},
         },
         THREE,
     )
