@@ -23,7 +23,7 @@ from dikbench.report.tables.kinds import kinds_with
 from dikbench.robots.catalogue import ROBOTS, load_robot
 from dikbench.scenario.oracle import ORACLE
 from dikbench.selector import parse_selector
-from dikbench.solvers.catalogue.back_ends import BACK_ENDS, is_installed
+from dikbench.solvers.catalogue.back_ends import BACK_ENDS, DEFAULT_SOLVER, is_installed
 from dikbench.solvers.catalogue.presets import TOLERANCES
 from dikbench.study.study import load_study, shipped_studies
 
@@ -173,6 +173,12 @@ def _solver(name: str) -> str:
             f"  linear programs: {entry.no_lp or 'yes'}",
             f"  presets: {presets} (largest residual of a verified answer)",
             f"  settings: {settings or 'none'}",
+            f"  then: another solver, asked where {name} gives no answer, as in {name}[then=...]",
+            *(
+                f"  the default of formulations with a program of kind {program}: {default}"
+                for program, default in DEFAULT_SOLVER.items()
+                if parse_selector(default).name == name
+            ),
         ]
     )
 

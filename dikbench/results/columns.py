@@ -10,6 +10,16 @@ TRIAL: Final = ["formulation", "solver", "scenario", "plant", "reference", "seed
 """Columns that identify the trial of a row."""
 
 KEYS: Final = (*TRIAL, "status", "message")
+SEES: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "sees_constraints": "whether the formulation sees the rows G v <= h of torques and "
+        "distances (1, 0; empty where there are none)",
+        "sees_lower_tasks": "whether the formulation sees every task below the first priority "
+        "(1, 0; empty where there is none)",
+    }
+)
+"""Columns of what a formulation sees of a scenario's problems, and what they say."""
+
 TIMED: Final = ["formulation", "solver", "scenario"]
 """Columns that identify the cell of a row of times."""
 
@@ -79,6 +89,7 @@ DESCRIBED: Final = MappingProxyType(
         "status": ("", "how the trial ended"),
         "message": ("", "why, where it did not end well"),
         "steps": ("", "number of control steps"),
+        **{name: ("", text) for name, text in SEES.items()},
         "wall_time_s": ("s", "time of the trial in its worker"),
         "control_time_s": ("s", "of it in kinematics, formulation and solver"),
         "environment": ("", "name of the worker's environment in the store"),

@@ -12,7 +12,7 @@ import pandas as pd
 
 from dikbench.errors import DikbenchError
 from dikbench.metrics import METRICS
-from dikbench.results.columns import DESCRIBED, KEYS, SELECTORS, TIMES
+from dikbench.results.columns import DESCRIBED, KEYS, SEES, SELECTORS, TIMES
 from dikbench.results.exports import MANIFEST, are_exported, read_manifest, read_trials
 from dikbench.results.folder import ResultsFolder
 from dikbench.results.selected import selected_columns, with_selected
@@ -25,6 +25,7 @@ NUMBERS: Final = (
     "seed",
     "steps",
     *METRICS,
+    *SEES,
     "wall_time_s",
     "control_time_s",
     *(name for name, (kind, _) in TIMES.items() if kind != "TEXT"),

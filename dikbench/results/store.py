@@ -20,6 +20,7 @@ from dikbench.results.columns import (
     REDEFINED,
     RENAMED_METRICS,
     RENAMED_TIMES,
+    SEES,
     TIMED,
     TIMES,
     TRIAL,
@@ -33,7 +34,7 @@ SCHEMA_VERSION: Final = 3
 """Version of the tables below. Stores of versions 1 and 2 are brought to it when they are opened;
 other versions are refused."""
 
-NUMBERS: Final = (*METRICS, "wall_time_s", "control_time_s")
+NUMBERS: Final = (*METRICS, *SEES, "wall_time_s", "control_time_s")
 
 TABLES: Final = f"""
 CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL);

@@ -12,7 +12,15 @@ from typing import Any, Literal
 from dikbench.errors import DikbenchError
 from dikbench.metrics import evaluate, motion_of
 from dikbench.plugins.building import make_formulation, make_plant, make_scenario
-from dikbench.problem.problem import program_of
+from dikbench.problem.posing import pose_problem
+from dikbench.problem.problem import (
+    DikProblem,
+    program_of,
+    refusal_of,
+    sees_constraints,
+    sees_lower_tasks,
+)
+from dikbench.robots.kinematics import Kinematics
 from dikbench.run.provenance import environment
 from dikbench.run.worker_process import restore_process
 from dikbench.scenario.oracle import ORACLE
@@ -103,7 +111,8 @@ def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "al
         policy: whether the trace is kept.
 
     Returns:
-        Its row: keys, status, message, number of steps, every metric; `wall_time_s` of the run and
+        Its row: keys, status, message, number of steps, every metric; what the formulation sees of
+        the problem, where there is something to see; `wall_time_s` of the run and
         `control_time_s` in kinematics, formulation and solver.
 
     Raises:
@@ -120,12 +129,17 @@ def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "al
     if oracle and scenario.oracle is None:
         reason = "no joint motion does what the scenario asks for"
         return row_without_run(trial, Status.SKIPPED, reason)
+    formulation = OracleFormulation.of(scenario) if oracle else make_formulation(trial.formulation)
+    problem = first_problem(scenario)
+    reason = refusal_of(formulation, problem)
+    if reason:
+        return row_without_run(trial, Status.SKIPPED, reason)
     plant = make_plant(trial.plant)
     mode: ReferenceMode = "path" if trial.reference == "path" else "time"
     start = perf_counter()
     run = simulate(
         scenario,
-        OracleFormulation.of(scenario) if oracle else make_formulation(trial.formulation),
+        formulation,
         make_solve(None, None) if oracle else solve_of(trial.formulation, trial.solver),
         plant,
         mode,
@@ -147,9 +161,20 @@ def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "al
         "message": run.message,
         "steps": run.trace.steps,
         **metrics,
+        "sees_constraints": None if oracle else sees_constraints(formulation, problem),
+        "sees_lower_tasks": None if oracle else sees_lower_tasks(formulation, problem),
         "wall_time_s": perf_counter() - start,
         "control_time_s": (run.kinematics_ns + run.formulation_ns) / 1e9,
     }
+
+
+def first_problem(scenario: Scenario) -> DikProblem:
+    """The problem of a scenario's first control step."""
+    kinematics = Kinematics(scenario.robot)
+    kinematics.update(scenario.q0)
+    task = scenario.tracking.linearize(kinematics, *scenario.target(0.0))
+    tasks, constraints = scenario.tasks, scenario.constraints
+    return pose_problem(kinematics, scenario.v0, scenario.dt, task, tasks, constraints)
 
 
 def _keep(save: Any, path: Path) -> None:

@@ -37,7 +37,7 @@ class Status(Enum):
         "The formulation raised an error that is not an answer.",
     )
     WRONG_SHAPE = ("wrong-shape", "The formulation did not return a vector of nv numbers.")
-    NOT_FINITE = ("not-finite", "The formulation returned NaN or infinity.")
+    NOT_FINITE = ("not-finite", "The formulation was given or returned NaN or infinity.")
     TIMEOUT = (
         "timeout",
         "The trial ran out of wall-clock time; lower its size or raise the limit.",

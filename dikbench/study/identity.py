@@ -13,7 +13,7 @@ from dikbench.plugins.finding import formulation_plugin, scenario_plugin
 from dikbench.plugins.source import digest, digest_of_file, source_digest
 from dikbench.scenario.oracle import ORACLE
 from dikbench.selector import Selector
-from dikbench.solvers.catalogue.back_ends import parse_solver
+from dikbench.solvers.catalogue.back_ends import Solver, parse_solver
 from dikbench.study.trial import NO_SOLVER, Trial
 
 
@@ -64,10 +64,13 @@ def _solver(selector: Selector) -> str:
     if selector == NO_SOLVER:
         return selector.name
     solver = parse_solver(selector)
-    settings: dict[str, Any] = {key: repr(value) for key, value in solver.settings.items()}
-    return digest(
-        json.dumps([solver.name, solver.interface, settings, solver.tolerance], sort_keys=True)
-    )
+    return digest(json.dumps(_described_solver(solver), sort_keys=True))
+
+
+def _described_solver(solver: Solver) -> list[Any]:
+    settings = {key: repr(value) for key, value in solver.settings.items()}
+    then = [] if solver.then is None else [_described_solver(solver.then)]
+    return [solver.name, solver.interface, settings, solver.tolerance, *then]
 
 
 def _described(value: Any) -> str:

@@ -20,6 +20,7 @@ from dikbench.report.sentences.words import (
     number,
     several,
 )
+from dikbench.statistics.failures import has_failed, ran
 from dikbench.statistics.stability import LARGEST_DRIFT_SHARE as DRIFT
 from dikbench.statistics.stability import STABLE
 from dikbench.statistics.trial_matrix import CONTENDER
@@ -129,12 +130,12 @@ def stay_on_course(rows: pd.DataFrame, names: Names) -> Finding:
     """Who slows down rather than leave the wanted direction, and who of them gets on best."""
     question = "Stays on course"
     worst = rows.groupby(CONTENDER, sort=False)["direction_error_max_rad"].max()
-    ran = [contender for contender in candidates(rows) if not math.isnan(worst[contender])]
-    if not ran:
+    whole = [contender for contender in candidates(rows) if not math.isnan(worst[contender])]
+    if not whole:
         return Finding(question, f"{NOBODY} went through all trials with answers to be trusted.")
-    staying = [contender for contender in ran if worst[contender] <= ON_COURSE]
+    staying = [contender for contender in whole if worst[contender] <= ON_COURSE]
     if not staying:
-        least = min(ran, key=lambda contender: float(worst[contender]))
+        least = min(whole, key=lambda contender: float(worst[contender]))
         return Finding(
             question,
             f"{NOBODY} stays within {degrees(ON_COURSE)} of the wanted direction; "
@@ -158,31 +159,39 @@ def stay_on_course(rows: pd.DataFrame, names: Names) -> Finding:
 def fail_most(rows: pd.DataFrame, names: Names) -> Finding:
     """Who fails most: by trials that broke off, else by steps that a law had no answer for."""
     question = "Fails most"
-    failed = rows["status"].ne("ok")
-    groups = rows.assign(failed=failed).groupby(CONTENDER, sort=False)
-    shares = groups["failed"].mean()
-    if failed.any():
-        most = list(shares[shares.ge(shares.max() - SAME)].index)
-        counts = rows[failed].set_index(CONTENDER).loc[most, "status"].value_counts()
-        reasons = listed([f"{number} {status}" for status, number in counts.items()])
-        ended = several(int(groups["failed"].sum()[most].sum()), "trial")
+    rows = ran(rows)
+    if rows.empty:
+        return Finding(question, "No trial was run.")
+    failed = rows[has_failed(rows)]
+    if len(failed):
+        counts = failed.groupby(CONTENDER, sort=False).size()
+        shares = counts / rows.groupby(CONTENDER, sort=False).size()[counts.index]
+        most = _largest(shares)
+        by_status = failed.set_index(CONTENDER).loc[most]["status"].value_counts()
+        reasons = listed([f"{number} {status}" for status, number in by_status.items()])
         each = " each" if len(most) > 1 else ""
         return Finding(
             question,
             f"{names.of(most)}: {number(100 * shares.max())} % of the trials{each} "
-            f"({ended}: {reasons}).",
+            f"({several(int(counts[most].sum()), 'trial')}: {reasons}).",
         )
     of_a_run = rows[["infeasible_share", "solver_failed_share"]].sum(axis=1)
     unanswered = rows.assign(unanswered=of_a_run).groupby(CONTENDER, sort=False)["unanswered"].max()
     worst = float(unanswered.max())
     if worst <= 0:
         return Finding(question, ALL_ANSWERED)
-    most = list(unanswered[unanswered.ge(worst - SAME)].index)
+    most = _largest(unanswered)
+    slowed = "was" if len(most) == 1 else "were"
     return Finding(
         question,
         f"No trial failed; {names.of(most)} had no answer in up to {number(100 * worst)} % of a "
-        "run's steps, and was slowed down.",
+        f"run's steps, and {slowed} slowed down.",
     )
+
+
+def _largest(shares: pd.Series) -> list[Contender]:
+    """Those with the largest share, which is not zero, and those whose share is the same."""
+    return list(shares[shares >= (1 - SAME) * shares.max()].index)
 
 
 def fastest(rows: pd.DataFrame, within_limits: Sequence[Contender], names: Names) -> Finding:

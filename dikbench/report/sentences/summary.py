@@ -69,8 +69,10 @@ def summarise(trials: pd.DataFrame) -> Summary:
     contenders = trials[trials["formulation"].ne(ORACLE) & trials["status"].ne("skipped")]
     if contenders.empty:
         return Summary("No formulation was run.")
-    plant, reference = _first(contenders["plant"], "ideal"), _first(contenders["reference"], "time")
-    rows = contenders[contenders["plant"].eq(plant) & contenders["reference"].eq(reference)]
+    plant = _first(contenders["plant"], "ideal")
+    rows = contenders[contenders["plant"].eq(plant)]
+    reference = _first(rows["reference"], "time")
+    rows = rows[rows["reference"].eq(reference)]
     names = Names(contenders)
     seed = int(rows["seed"].min())
     kinds = {scenario: situation_of(scenario, seed) for scenario in rows["scenario"].unique()}
