@@ -57,7 +57,7 @@ def _targets(trace: Trace, scenario: Scenario) -> tuple[Array, Array]:
     if n <= scenario.steps and np.array_equal(trace.tau, np.arange(n + 1) * scenario.dt):
         rotations, translations = scenario.target_arrays
         return rotations[: n + 1], translations[: n + 1]
-    placements = [scenario.reference.placement(float(tau)) for tau in trace.tau]
+    placements = [scenario.target(float(tau))[0] for tau in trace.tau]
     return np.array([X.rotation for X in placements]), np.array([X.translation for X in placements])
 
 

@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 
 from dikbench.arrays import Array, Mask
 from dikbench.metrics.chatter import chattering
 from dikbench.metrics.motion import Motion
+from dikbench.scenario.witness import INSIDE_SHARE, Feasible, outside
 from dikbench.simulation.status import Status
-
-Feasible = Literal["time", "path", "no", "unknown"]
-"""Whether a motion is known that keeps all limits by the clock, or if the path may wait; or none
-can be, or none is known."""
 
 COLLISION_TOLERANCE_M: Final = 1e-3
 """A distance may fall short of its margin by this."""
@@ -32,9 +29,6 @@ TORQUE_TOLERANCE: Final = 1.001
 
 POSITION_TOLERANCE: Final = 1e-3
 """A joint may be so far outside its position limits [rad or m]."""
-
-FARTHER_OUT: Final = 1e-4
-"""A joint that starts outside may go farther out by this [rad or m] until half of the run."""
 
 CHATTER_SHARE: Final = 0.05
 """A motion chatters that does so in more than this share of its steps ..."""
@@ -195,10 +189,12 @@ def _before_any_tolerance(motion: Motion, status: Status) -> Verdict | None:
         for values, most, reason in _shares_of_limits(motion)
         if (values > most).any()
     ]
-    outside = _outside(motion)
-    if (outside > 0).any():
+    trace, reference = motion.trace, motion.scenario.reference
+    late = trace.dt * np.arange(trace.steps + 1) >= INSIDE_SHARE * reference.duration
+    outside_by = outside(motion.scenario.robot, trace.q, late, POSITION_TOLERANCE)
+    if (outside_by > 0).any():
         reason = "distance [rad or m] of a joint outside what it may be"
-        broken.append(_first(Outcome.LIMIT_BROKEN, outside > 0, outside, reason))
+        broken.append(_first(Outcome.LIMIT_BROKEN, outside_by > 0, outside_by, reason))
     return min(broken, key=lambda verdict: verdict.step) if broken else None
 
 
@@ -215,25 +211,6 @@ def _shares_of_limits(motion: Motion) -> list[tuple[Array, float, str]]:
     if len(motion.torque_usage):
         shares.append((motion.torque_usage, TORQUE_TOLERANCE, "joint torque over its limit"))
     return shares
-
-
-def _outside(motion: Motion) -> Array:
-    """Compute how far the worst joint is outside of where it may be, (n + 1,), below 0 inside.
-
-    A joint that starts outside may stay there, but go no farther, until half of the run.
-    """
-    limits, trace = motion.scenario.robot.limits, motion.trace
-    if limits.position is None:
-        return np.full(trace.steps + 1, -np.inf)
-    q = trace.q[:, limits.q_index]
-    excess = np.maximum(q - limits.position.upper, limits.position.lower - q)
-    allowed = np.full_like(excess, POSITION_TOLERANCE)
-    started_outside = excess[0] > POSITION_TOLERANCE
-    half = -(-motion.scenario.steps // 2)
-    allowed[:half, started_outside] = excess[0, started_outside] + FARTHER_OUT
-    beyond = np.where(limits.q_index >= 0, excess - allowed, -np.inf)
-    worst: Array = beyond.max(axis=1, initial=-np.inf)
-    return worst
 
 
 def _off_path(motion: Motion) -> Verdict:

@@ -41,8 +41,9 @@ def course(motion: Motion) -> float:
     if motion.along_path is None:
         return NAN
     path = motion.along_path.path
-    pieces = np.minimum(path.last_until(motion.trace.tau[:-1]), len(path.pieces) - 1)
-    speeds = np.sqrt(path.squares[pieces]) / np.diff(path.times)[pieces]
+    samples = path.last_until(motion.trace.tau[:-1])
+    # At the end the reference rests.
+    speeds = np.append(np.sqrt(path.squares) / np.diff(path.times), 0.0)[samples]
     moving = speeds > DWELL_SPEED_M_S
     if not moving.any():
         return NAN

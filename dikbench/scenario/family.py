@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Final
+
+import numpy as np
 
 from dikbench.arrays import Array
 from dikbench.parameters import Parameters, Range, parameters_of
@@ -23,6 +25,11 @@ from dikbench.scenario.oracle import POSE, OracleMotion, oracle_motion
 from dikbench.scenario.reference.reference import Reference
 from dikbench.scenario.scenario import Judged, Scenario, first_level
 from dikbench.scenario.variation import NO_VARIATION, Perturbation, Variation
+from dikbench.scenario.witness import Feasible, Witness, witness_of
+
+RETURN_TIME_CONSTANTS: Final = 5.0
+"""Time constants 1/gain of the tracking task for which a time-indexed run goes on with the target
+at rest at its end: an error falls to less than a hundredth."""
 
 Gain = Annotated[float, Range(above=0.0, unit="1/s")]
 """The gain of a task, the desired velocity per error."""
@@ -44,8 +51,9 @@ class Case:
         tracking: the task that follows the reference; default: the whole pose.
         v0: joint velocity at the start, (nv,) [rad/s or m/s]; default: the reference's own.
         tasks: other tasks; default: hold the posture q0 in the null space, where there is one.
-        duration: length of a time-indexed run [s]; default: the reference's.
         constraints: conditions in addition to the joint limits.
+        witness: a joint motion that does the task and keeps limits and distances where `motion`
+            does not.
     """
 
     reference: Reference
@@ -56,8 +64,8 @@ class Case:
     tracking: TrackingTask | None = None
     v0: Array | None = None
     tasks: tuple[Task, ...] | None = None
-    duration: float | None = None
     constraints: tuple[Constraint, ...] = ()
+    witness: OracleMotion | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,6 +133,11 @@ class Family(Parameters, ABC):
             tasks = secondary_tasks(robot, case.q0, tracking)
         if v0 is None:
             v0 = start_velocity(robot, case.reference, case.q0, first_level(tracking, tasks))
+        witness = _first_witness(case, robot, v0)
+        feasible, duration = _feasible(case.reference, witness), case.reference.duration
+        if case.reference.moving:
+            # It rests at its end for as long as it takes to see who is late and who comes back.
+            duration += RETURN_TIME_CONSTANTS / self.gain + _lateness(case.motion, witness)
         made = Scenario(
             robot=robot,
             q0=case.q0,
@@ -132,7 +145,7 @@ class Family(Parameters, ABC):
             reference=case.reference,
             tracking=tracking,
             dt=self.dt,
-            duration=case.reference.duration if case.duration is None else case.duration,
+            duration=duration,
             certificate=Certificate(case.claims),
             tasks=tasks,
             motion=case.motion,
@@ -141,6 +154,8 @@ class Family(Parameters, ABC):
             tolerance_m=self.tolerance_m,
             judged=self.judged,
             longest_path_run=self.longest_path_run,
+            feasible=feasible,
+            witness=witness,
         )
         made.certificate.check(type(self).__name__)
         return made
@@ -160,6 +175,36 @@ class Family(Parameters, ABC):
         """
         instants = samples(reference.duration, self.dt, most)
         return oracle_motion(robot, reference, q0, instants, tracking)
+
+
+def _first_witness(case: Case, robot: Robot, v0: Array) -> Witness | None:
+    """Return the first of a case's joint motions that is a witness; None where none is."""
+    for motion in (case.motion, case.witness):
+        if motion is not None:
+            duration = case.reference.duration
+            witness = witness_of(robot, motion, case.constraints, v0, duration)
+            if witness is not None:
+                return witness
+    return None
+
+
+def _feasible(reference: Reference, witness: Witness | None) -> Feasible:
+    """Say what a witness shows of a reference."""
+    if witness is None:
+        return "unknown"
+    if reference.moving:
+        return "time" if witness.by_clock else "path"
+    there = float(witness.motion.instants[-1]) + witness.lateness
+    return "time" if there <= reference.duration else "unknown"
+
+
+def _lateness(motion: OracleMotion | None, witness: Witness | None) -> float:
+    """Compute how late [s] the slowed motion is, or the exact one within its speed limits."""
+    if witness is not None:
+        return witness.lateness
+    if motion is None:
+        return 0.0
+    return float((np.diff(motion.instants) * np.maximum(motion.speed_ratio - 1, 0.0)).sum())
 
 
 def certified_robots(family: type[Family]) -> tuple[str, ...]:

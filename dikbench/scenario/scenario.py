@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 import pinocchio as pin
 
 from dikbench.arrays import Array
-from dikbench.problem.constraints import Constraint
+from dikbench.problem.constraints import Constraint, TorqueConstraint
 from dikbench.problem.embedding import Embedding, embedding_of
 from dikbench.problem.tasks import Task, TrackingTask, TrackingTogether
 from dikbench.robots.robot import Robot
@@ -22,6 +22,10 @@ from dikbench.scenario.reference.path import ReferencePath, reference_path
 from dikbench.scenario.reference.reference import Reference
 from dikbench.scenario.steps import steps_in
 from dikbench.scenario.variation import NO_VARIATION, Variation
+from dikbench.scenario.witness import Feasible, Witness
+
+REST_ROUNDING_S: Final = 1e-9
+"""A reference that moves is at its end when this nominal time remains."""
 
 Judged = Literal["path", "end"]
 """What of a motion is judged: its whole way, or where it ends."""
@@ -45,7 +49,8 @@ class Scenario:
         reference: the desired motion of the task frame.
         tracking: the task that follows it: pose, position or orientation.
         dt: control period [s].
-        duration: length of a time-indexed run [s].
+        duration: length of a time-indexed run [s]; a reference that moves rests at its end until
+            then.
         certificate: the claims about its difficulty.
         tasks: other tasks, of lower or the same priority.
         motion: the joint motion from which the path was built, on which the certificate was
@@ -57,6 +62,8 @@ class Scenario:
         judged: whether the whole path is judged, or the end alone.
         longest_path_run: nominal durations after which a path-indexed run ends, if not with its
             path before.
+        feasible: what a motion is known for that keeps all limits.
+        witness: that motion; None where none is known.
     """
 
     robot: Robot
@@ -74,6 +81,8 @@ class Scenario:
     tolerance_m: float = 0.005
     judged: Judged = "path"
     longest_path_run: float = 5.0
+    feasible: Feasible = "unknown"
+    witness: Witness | None = None
 
     def __post_init__(self) -> None:
         """Check the number of control steps (see `steps_in`)."""
@@ -103,8 +112,19 @@ class Scenario:
         return [self.target(k * self.dt) for k in range(self.steps + 1)]
 
     def target(self, tau: float) -> tuple[Any, Any]:
-        """Compute placement and body twist of the reference at a nominal time [s]."""
-        return self.reference.placement(tau), pin.Motion(self.reference.velocity(tau))
+        """Compute placement and body twist of the reference at a nominal time [s].
+
+        At its end, and after it, a reference that moves is at rest. The last twist before leads to
+        the end in one control period, and not past it.
+        """
+        reference = self.reference
+        if not reference.moving:
+            return reference.placement(tau), pin.Motion(reference.velocity(tau))
+        left = reference.duration - tau
+        if left < REST_ROUNDING_S:
+            return reference.placement(reference.duration), pin.Motion.Zero()
+        share = min(1.0, left / self.dt)
+        return reference.placement(tau), pin.Motion(share * reference.velocity(tau))
 
     @cached_property
     def target_arrays(self) -> tuple[Array, Array]:
@@ -114,11 +134,9 @@ class Scenario:
 
     @cached_property
     def path(self) -> ReferencePath | None:
-        """The path of the reference, to the end of any run; None for a target at rest."""
-        if not self.reference.moving:
-            return None
-        end = max(self.reference.duration, self.steps * self.dt)
-        return reference_path(self.reference, end, self.dt)
+        """The path of the reference; None for a target at rest."""
+        reference = self.reference
+        return reference_path(reference, self.dt) if reference.moving else None
 
     @cached_property
     def embedding(self) -> Embedding:
@@ -131,7 +149,12 @@ class Scenario:
         """The path of the reference in position and orientation; None for a target at rest."""
         if not self.reference.moving:
             return None
-        return embedded_path(self.reference, self.embedding, self.steps * self.dt, self.dt)
+        return embedded_path(self.reference, self.embedding, self.dt)
+
+    @property
+    def limits_torques(self) -> bool:
+        """Whether torque limits are a condition."""
+        return any(isinstance(each, TorqueConstraint) for each in self.constraints)
 
     @cached_property
     def held_frames(self) -> tuple[HeldFrame, ...]:
@@ -148,6 +171,8 @@ class Scenario:
         if self.motion is None:
             return None
         instants = self.dt * np.arange(self.steps + 1, dtype=float)
+        if self.reference.moving:
+            instants = np.minimum(instants, self.reference.duration)
         if self.motion.exact is not None:
             return np.array([self.motion.exact(tau) for tau in instants])
         return follow(self.robot, self.reference, self.q0, instants, self.first)

@@ -79,9 +79,10 @@ class PathClock:
     def __init__(self, scenario: Scenario) -> None:
         assert scenario.embedded_path is not None
         self.tau = 0.0
-        self.most_steps = max(1, round(scenario.longest_path_run * scenario.steps))
         self._dt, self._target = scenario.dt, scenario.target
         self._duration = scenario.reference.duration
+        longest = scenario.longest_path_run * self._duration
+        self.most_steps = max(1, round(longest / self._dt))
         self._path, self._embedding = scenario.embedded_path, scenario.embedding
         self._frame, self._model = scenario.robot.frame_id, scenario.robot.model
         self._data = self._model.createData()

@@ -201,21 +201,17 @@ class EmbeddedPath:
         return tangents
 
 
-def embedded_path(
-    reference: Reference, embedding: Embedding, end: float, dt: float
-) -> EmbeddedPath:
+def embedded_path(reference: Reference, embedding: Embedding, dt: float) -> EmbeddedPath:
     """Sample the path of a moving reference.
 
     Args:
         reference: the reference.
         embedding: of its task.
-        end: nominal time of the last target of a time-indexed run [s], k dt.
         dt: control period [s].
     """
+    end = reference.duration
     count = int(np.clip(SAMPLES_PER_PERIOD * round(end / dt), FEWEST_SAMPLES, MOST_SAMPLES))
     times = np.linspace(0.0, end, count + 1)
-    if np.abs(times - reference.duration).min() > SAME_INSTANT_S:
-        times = np.sort(np.append(times, reference.duration))
     placements = [reference.placement(tau) for tau in times.tolist()]
     points = embedding.points(
         np.array([X.rotation for X in placements]), np.array([X.translation for X in placements])

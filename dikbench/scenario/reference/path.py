@@ -103,12 +103,12 @@ class ReferencePath:
         return share, np.einsum("...i,...i->...", away, away)
 
 
-def reference_path(reference: Reference, end: float, dt: float) -> ReferencePath:
-    """Compute the path of a moving reference up to a nominal time [s], sampled at dt [s] or finer.
+def reference_path(reference: Reference, dt: float) -> ReferencePath:
+    """Compute the path of a moving reference, sampled at dt [s] or finer.
 
     Pieces are as long as `CHORD_ERROR_M` and `LONGEST_PIECE_M` allow.
     """
-    times, points = _samples(reference, end, dt)
+    times, points = _samples(reference, dt)
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     arcs = np.concatenate([[0.0], np.cumsum(steps)])
     kept = _simplified(points, steps, arcs)
@@ -117,8 +117,9 @@ def reference_path(reference: Reference, end: float, dt: float) -> ReferencePath
     return ReferencePath(points[kept], once)
 
 
-def _samples(reference: Reference, end: float, dt: float) -> tuple[Array, Array]:
+def _samples(reference: Reference, dt: float) -> tuple[Array, Array]:
     """Sample times (f,) [s] and points (f, 3) [m], so that chords are within `CHORD_ERROR_M`."""
+    end = reference.duration
 
     def at(times: Array) -> Array:
         points = [reference.placement(tau).translation for tau in times.tolist()]

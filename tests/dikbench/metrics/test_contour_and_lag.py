@@ -303,7 +303,7 @@ def test_distances_are_the_least_over_the_curve(seed: int) -> None:
         lambda tau: np.zeros(6),
     )
     for reference in (ROUND, EIGHT, polygon):
-        path = reference_path(reference, reference.duration, DT)
+        path = reference_path(reference, DT)
         points = np.array(
             [reference.placement(tau).translation for tau in random.uniform(0, 4, 12)]
         )

@@ -14,10 +14,11 @@ import pytest
 
 from dikbench.arrays import Array
 from dikbench.metrics import motion_of
-from dikbench.metrics.outcome import Feasible, Judgement, Outcome, Verdict, judge
+from dikbench.metrics.outcome import Judgement, Outcome, Verdict, judge
 from dikbench.plugins.building import make_formulation, make_plant, make_scenario
 from dikbench.problem import DikProblem, Solve
 from dikbench.scenario import Scenario
+from dikbench.scenario.witness import Feasible
 from dikbench.simulation.clock import ReferenceMode
 from dikbench.simulation.closed_loop import simulate
 from dikbench.simulation.status import Status
