@@ -83,6 +83,10 @@ class Scenario:
     longest_path_run: float = 5.0
     feasible: Feasible = "unknown"
     witness: Witness | None = None
+    followable_until: float | None = None
+    comes_back: bool = False
+    situation: str = ""
+    need: float = float("nan")
 
     def __post_init__(self) -> None:
         """Check the number of control steps (see `steps_in`)."""

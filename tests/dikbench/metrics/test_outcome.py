@@ -13,8 +13,7 @@ import pinocchio as pin
 import pytest
 
 from dikbench.arrays import Array
-from dikbench.metrics import motion_of
-from dikbench.metrics.outcome import Judgement, Outcome, Verdict, judge
+from dikbench.metrics import Judgement, Outcome, Verdict, judge, motion_of
 from dikbench.plugins.building import make_formulation, make_plant, make_scenario
 from dikbench.problem import DikProblem, Solve
 from dikbench.scenario import Scenario
