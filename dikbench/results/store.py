@@ -25,7 +25,7 @@ from dikbench.results.columns import (
     TIMES,
     TRIAL,
 )
-from dikbench.scenario.oracle import ORACLE
+from dikbench.scenario.oracle import ORACLES
 from dikbench.study.identity import timing_id
 from dikbench.study.plan import PlannedTrial
 from dikbench.study.trial import Trial
@@ -149,7 +149,7 @@ class Store:
                 p.trial.formulation, p.trial.solver, p.trial.scenario
             )
             for p in planned
-            if p.trial.formulation.name != ORACLE
+            if p.trial.formulation.name not in ORACLES
         }
         self._database.executemany(
             "UPDATE OR REPLACE times SET formulation = ?, solver = ?, scenario = ? WHERE id = ?",

@@ -23,12 +23,12 @@ from dikbench.problem.problem import (
 from dikbench.robots.kinematics import Kinematics
 from dikbench.run.provenance import environment
 from dikbench.run.worker_process import restore_process
-from dikbench.scenario.oracle import ORACLE
+from dikbench.scenario.oracle import ORACLES
 from dikbench.scenario.scenario import Scenario
 from dikbench.selector import Selector
 from dikbench.simulation.clock import ReferenceMode
 from dikbench.simulation.closed_loop import simulate
-from dikbench.simulation.oracle_formulation import OracleFormulation
+from dikbench.simulation.oracle_formulation import oracle_of
 from dikbench.simulation.status import Status
 from dikbench.solvers.catalogue.back_ends import parse_solver
 from dikbench.solvers.checked_solve import CheckedSolve, make_solve
@@ -129,11 +129,15 @@ def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "al
     if trial.reference == "path" and not scenario.reference.moving:
         reason = "the scenario has no path that could wait for the robot"
         return row_without_run(trial, Status.SKIPPED, reason)
-    oracle = trial.formulation.name == ORACLE
-    if oracle and scenario.oracle is None:
-        reason = "no joint motion does what the scenario asks for"
+    oracle = trial.formulation.name in ORACLES
+    formulation = (
+        oracle_of(trial.formulation.name, scenario)
+        if oracle
+        else make_formulation(trial.formulation)
+    )
+    if formulation is None:
+        reason = "no joint motion is known that does what the scenario asks for"
         return row_without_run(trial, Status.SKIPPED, reason)
-    formulation = OracleFormulation.of(scenario) if oracle else make_formulation(trial.formulation)
     problem = first_problem(scenario)
     reason = refusal_of(formulation, problem)
     if reason:
