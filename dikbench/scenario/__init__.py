@@ -72,10 +72,12 @@ from dikbench.scenario.singularity import (
     make_singular,
     singular_postures,
 )
+from dikbench.scenario.situation import SINGULAR_NEED, Situation
 from dikbench.scenario.variation import Perturbation, Variation
 
 __all__ = [
     "POSTURE_WEIGHT",
+    "SINGULAR_NEED",
     "Array",
     "BoxObstacle",
     "CapsuleObstacle",
@@ -106,6 +108,7 @@ __all__ = [
     "Robot",
     "Scenario",
     "Singularity",
+    "Situation",
     "SphereObstacle",
     "Task",
     "Time",
