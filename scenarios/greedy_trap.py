@@ -78,4 +78,11 @@ class GreedyTrap(Family):
             Claim("error at the end of the way round (m, rad)", missed, at_most=1e-9),
             Claim("its required speed over limit", motion.peak_speed_ratio, at_most=0.9),
         )
-        return Case(target_at_rest(target, duration), q0, motion, claims, v0=np.zeros(1))
+        return Case(
+            target_at_rest(target, duration),
+            q0,
+            motion,
+            claims,
+            v0=np.zeros(1),
+            situation="at joint limits",
+        )

@@ -17,6 +17,7 @@ from dikbench.scenario import (
     Claim,
     Family,
     Perturbation,
+    Situation,
     Variation,
     joint_oracle,
     placement_of,
@@ -57,6 +58,11 @@ POSTURES: Mapping[str, Postures] = MappingProxyType(
         "ur10": _UR,
     }
 )
+
+SITUATIONS: Mapping[str, Situation] = MappingProxyType(
+    {"start": "free space", "singular": "near singularities", "limit": "at joint limits"}
+)
+"""What is difficult about a posture."""
 
 RANGES: Mapping[str, tuple[tuple[float, float], tuple[float, float]]] = MappingProxyType(
     {
@@ -105,7 +111,8 @@ class HoldStill(Family):
             Claim("position margin [rad]", motion.margin.min(), *margin),
         )
         reference = target_at_rest(placement_of(robot, q0), DURATION_S)
-        return Case(reference, q0, motion, claims, v0=np.zeros(robot.nv))
+        situation = SITUATIONS[self.posture]
+        return Case(reference, q0, motion, claims, v0=np.zeros(robot.nv), situation=situation)
 
     def _posture(self, robot: Robot, change: Perturbation) -> Array:
         where = POSTURES[self.robot]

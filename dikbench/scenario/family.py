@@ -21,11 +21,12 @@ from dikbench.scenario.building import (
     start_velocity,
 )
 from dikbench.scenario.certificate import Certificate, Claim
-from dikbench.scenario.oracle import POSE, OracleMotion, oracle_motion
+from dikbench.scenario.oracle import POSE, OracleMotion, oracle_motion, position_margin
 from dikbench.scenario.reference.reference import Reference
 from dikbench.scenario.scenario import Judged, Scenario, first_level
+from dikbench.scenario.situation import Situation, situation_of
 from dikbench.scenario.variation import NO_VARIATION, Perturbation, Variation
-from dikbench.scenario.witness import Feasible, Witness, witness_of
+from dikbench.scenario.witness import Feasible, Witness, beyond, followable, witness_of
 
 RETURN_TIME_CONSTANTS: Final = 5.0
 """Time constants 1/gain of the tracking task for which a time-indexed run goes on with the target
@@ -54,6 +55,9 @@ class Case:
         constraints: conditions in addition to the joint limits.
         witness: a joint motion that does the task and keeps limits and distances where `motion`
             does not.
+        followable_until, comes_back: see `Scenario`; default: those of `motion`, from end to end
+            where there is none.
+        situation: what is difficult about it; default: what its motion says (`situation_of`).
     """
 
     reference: Reference
@@ -66,6 +70,9 @@ class Case:
     tasks: tuple[Task, ...] | None = None
     constraints: tuple[Constraint, ...] = ()
     witness: OracleMotion | None = None
+    followable_until: float | None = None
+    comes_back: bool = True
+    situation: Situation | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,7 +142,15 @@ class Family(Parameters, ABC):
             v0 = start_velocity(robot, case.reference, case.q0, first_level(tracking, tasks))
         witness = _first_witness(case, robot, v0)
         feasible, duration = _feasible(case.reference, witness), case.reference.duration
-        if case.reference.moving:
+        until, comes_back = case.followable_until, case.comes_back
+        if witness is None and case.motion is not None:
+            left = beyond(robot, case.motion, case.constraints, duration)
+            until, comes_back = followable(case.motion.instants, left)
+        moving = case.reference.moving
+        situation = case.situation or situation_of(
+            case.motion, case.constraints, position_margin(robot, case.q0), moving=moving
+        )
+        if moving:
             # It rests at its end for as long as it takes to see who is late and who comes back.
             duration += RETURN_TIME_CONSTANTS / self.gain + _lateness(case.motion, witness)
         made = Scenario(
@@ -156,6 +171,9 @@ class Family(Parameters, ABC):
             longest_path_run=self.longest_path_run,
             feasible=feasible,
             witness=witness,
+            followable_until=until,
+            comes_back=comes_back,
+            situation=situation,
         )
         made.certificate.check(type(self).__name__)
         return made

@@ -20,6 +20,7 @@ from dikbench.scenario.oracle import OracleMotion, follow
 from dikbench.scenario.reference.embedded_path import EmbeddedPath, embedded_path
 from dikbench.scenario.reference.path import ReferencePath, reference_path
 from dikbench.scenario.reference.reference import Reference
+from dikbench.scenario.situation import Situation
 from dikbench.scenario.steps import steps_in
 from dikbench.scenario.variation import NO_VARIATION, Variation
 from dikbench.scenario.witness import Feasible, Witness
@@ -64,6 +65,12 @@ class Scenario:
             path before.
         feasible: what a motion is known for that keeps all limits.
         witness: that motion; None where none is known.
+        infeasible_because: the proof that there is none, in words, where it is `no`; else empty.
+        followable_until: nominal time [s] at which the exact motion first breaks a position limit
+            or a distance, or where the reference leaves the reach; None where the reference can be
+            followed to its end.
+        comes_back: whether the end of the reference can be reached.
+        situation: what is difficult about it.
     """
 
     robot: Robot
@@ -83,10 +90,10 @@ class Scenario:
     longest_path_run: float = 5.0
     feasible: Feasible = "unknown"
     witness: Witness | None = None
+    infeasible_because: str = ""
     followable_until: float | None = None
-    comes_back: bool = False
-    situation: str = ""
-    need: float = float("nan")
+    comes_back: bool = True
+    situation: Situation = "free space"
 
     def __post_init__(self) -> None:
         """Check the number of control steps (see `steps_in`)."""
@@ -96,6 +103,11 @@ class Scenario:
     def steps(self) -> int:
         """Number of control steps of a time-indexed run."""
         return steps_in(self.duration, self.dt)
+
+    @property
+    def need(self) -> float:
+        """The largest joint speed of the exact motion over its limit; NaN where there is none."""
+        return float("nan") if self.motion is None else self.motion.peak_speed_ratio
 
     @cached_property
     def rows(self) -> tuple[int, ...]:

@@ -78,12 +78,8 @@ def witness_of(
         v0: joint velocity at the start, (nv,) [rad/s or m/s].
         duration: nominal duration of the reference [s].
     """
-    if (outside(robot, motion.q, motion.instants >= INSIDE_SHARE * duration) > 0).any():
+    if (beyond(robot, motion, constraints, duration) > 0).any():
         return None
-    for constraint in constraints:
-        if isinstance(constraint, CollisionConstraint):
-            if constraint.distances(robot, motion.q).min() < constraint.margin - ROUNDING_M:
-                return None
     paces = 1 / np.maximum(1.0, motion.speed_ratio)
     if any(isinstance(constraint, TorqueConstraint) for constraint in constraints):
         pace = _pace_of_torques(robot, motion, float(paces.min(initial=1.0)))
@@ -100,6 +96,38 @@ def witness_of(
         if not witness.by_clock or limit.usage(changes / between[:, None]).max() > 1.0:
             return None
     return witness
+
+
+def beyond(
+    robot: Robot, motion: OracleMotion, constraints: Sequence[Constraint], duration: float
+) -> Array:
+    """Compute how far a motion breaks a position limit or falls short of a distance, (k + 1,).
+
+    The larger of the two [rad or m]; at most 0 where it keeps them. The arguments are those of
+    `witness_of`.
+    """
+    most = outside(robot, motion.q, motion.instants >= INSIDE_SHARE * duration)
+    for constraint in constraints:
+        if isinstance(constraint, CollisionConstraint):
+            distances = constraint.distances(robot, motion.q)
+            most = np.maximum(most, constraint.margin - ROUNDING_M - distances)
+    return most
+
+
+def followable(instants: Array, beyond: Array) -> tuple[float | None, bool]:
+    """Find until when [s] a motion can be followed, None to its end; and if its end can be reached.
+
+    Args:
+        instants: nominal times of its samples, (k + 1,) [s].
+        beyond: how far it breaks a limit at them, (k + 1,).
+    """
+    broken = np.flatnonzero(beyond > 0)
+    if not len(broken):
+        return None, True
+    k, back = int(broken[0]), bool(beyond[-1] <= 0)
+    if k == 0 or np.isinf(beyond[k - 1]):
+        return float(instants[k]), back
+    return float(np.interp(0.0, beyond[k - 1 : k + 1], instants[k - 1 : k + 1])), back
 
 
 def outside(
