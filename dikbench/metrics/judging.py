@@ -79,6 +79,7 @@ def outcome_columns(motion: Motion, status: Status) -> dict[str, Any]:
         **judgement.columns(scenario.tolerance_m),
         "coped": coped(motion, judgement),
         "situation": scenario.situation,
+        "robot": scenario.robot.name,
         "speed_need": scenario.need,
     }
 

@@ -170,7 +170,8 @@ OUTCOME_TEXTS: Final[Mapping[str, str]] = MappingProxyType(
         "decided_before": "outcome that was decided before any tolerance; empty where none was",
         "off_path_by": "whether the largest distance from the path is by position or orientation",
         "feasible": "what a motion is known for that keeps all limits: time, path, no or unknown",
-        "situation": "the situation of the scenario",
+        "situation": "what is difficult about the scenario",
+        "robot": "name of the robot",
     }
 )
 """Columns of outcomes that are texts, and what they say."""
