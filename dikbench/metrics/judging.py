@@ -81,6 +81,7 @@ def outcome_columns(motion: Motion, status: Status) -> dict[str, Any]:
         "situation": scenario.situation,
         "robot": scenario.robot.name,
         "speed_need": scenario.need,
+        "followable_until_s": scenario.followable_until,
     }
 
 

@@ -186,6 +186,8 @@ OUTCOME_NUMBERS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
         "tolerance_m": ("m", "tolerance of the scenario, at which `outcome` is decided"),
         "coped": ("", "where nothing can follow: whether limits were kept, the path done as far as "
                   "can be, and its end reached where it can be (1, 0)"),
+        "followable_until_s": ("s", "nominal time of the exact motion's first break of a position "
+                               "limit or a distance; empty where it keeps all"),
         "speed_need": ("", "largest joint speed of the exact motion over its limit"),
     }
 )  # fmt: skip

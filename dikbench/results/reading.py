@@ -140,7 +140,8 @@ def read_results(path: Path, *, lenient: bool = False) -> Results:
         trials = with_selected(trials)
     except DikbenchError as error:
         raise DikbenchError(f"{path}: {error}") from None
-    return Results(folder, manifest, _described(trials), tuple(notes))
+    # Columns that were added one by one lie apart, which pandas warns about.
+    return Results(folder, manifest, _described(trials.copy()), tuple(notes))
 
 
 def _stored_or_exported(
