@@ -86,7 +86,8 @@ class WorkspaceBoundary(Family):
         else:
             along = start.rotation.T @ ray
             reference = _out_and_back(at, along, first, length, self.speed)
-            until = reference.duration / pi * float(np.arcsin(np.sqrt((reach - first) / length)))
+            share = min(1.0, max(0.0, (reach - first) / length))
+            until = reference.duration / pi * float(np.arcsin(np.sqrt(share)))
         asked = robot.reach_of(reference.placement(reference.duration / 2))
         sigma = motion.sigma_min
         claims = (

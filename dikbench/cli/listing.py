@@ -24,6 +24,7 @@ from dikbench.plugins.finding import (
 from dikbench.report.tables.kinds import kinds_with
 from dikbench.robots.catalogue import ROBOTS, load_robot
 from dikbench.scenario.oracle import ORACLE, ORACLES, SLOWED_ORACLE
+from dikbench.scenario.scenario import Scenario
 from dikbench.selector import parse_selector
 from dikbench.solvers.catalogue.back_ends import BACK_ENDS, DEFAULT_SOLVER, is_installed
 from dikbench.solvers.catalogue.presets import TOLERANCES
@@ -166,7 +167,29 @@ def _difficulty(text: str) -> list[str]:
             f"  required speed over limit: up to {motion.peak_speed_ratio:.4g}",
             f"  reach from the first joint [m]: {reach.min():.4g} to {reach.max():.4g}",
         ]
-    return [*lines, "", f"A seed perturbs: {scenario.variation}."]
+    return [*lines, "", *_verdict(scenario), "", f"A seed perturbs: {scenario.variation}."]
+
+
+def _verdict(scenario: Scenario) -> list[str]:
+    """Describe by what a scenario's trials are judged, and what can be done of it."""
+    witness, until = scenario.witness, scenario.followable_until
+    late = 0.0 if witness is None else witness.lateness
+    known = {
+        "time": "a motion is known that keeps all limits by the clock",
+        "path": f"a motion is known that keeps all limits if the path may wait, {late:.3g} s late",
+        "no": scenario.infeasible_because,
+        "unknown": "neither a motion is known nor a proof that there is none",
+    }[scenario.feasible]
+    end = "its end can be reached" if scenario.comes_back else "its end cannot be reached"
+    return [
+        "How its trials are judged:",
+        f"  situation: {scenario.situation}",
+        f"  judged by: {'the whole path' if scenario.judged == 'path' else 'where it ends'}",
+        f"  tolerance [m]: {scenario.tolerance_m:g}",
+        f"  feasible: {known}",
+        f"  need (joint speed of the exact motion over its limit): {scenario.need:.4g}",
+        "  can be followed until: " + ("its end" if until is None else f"{until:.4g} s; {end}"),
+    ]
 
 
 def _solver(name: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, Final
 
 import numpy as np
@@ -21,6 +21,7 @@ from dikbench.scenario.building import (
     start_velocity,
 )
 from dikbench.scenario.certificate import Certificate, Claim
+from dikbench.scenario.infeasible import infeasible_because
 from dikbench.scenario.oracle import POSE, OracleMotion, oracle_motion, position_margin
 from dikbench.scenario.reference.reference import Reference
 from dikbench.scenario.scenario import Judged, Scenario, first_level
@@ -176,6 +177,8 @@ class Family(Parameters, ABC):
             situation=situation,
         )
         made.certificate.check(type(self).__name__)
+        if made.feasible == "unknown" and (reason := infeasible_because(made)):
+            return replace(made, feasible="no", infeasible_because=reason)
         return made
 
     def exact_motion(

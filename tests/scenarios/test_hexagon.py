@@ -67,7 +67,7 @@ def test_it_starts_as_published_and_visits_the_corners_in_order(robot: str) -> N
     for k in range(13):
         corner = scenario.reference.placement(first + k * 0.2 / 0.4).translation
         assert corner == pytest.approx(CORNERS[robot][k % 6], abs=1e-9)
-    assert scenario.duration == pytest.approx(first + 12 * 0.2 / 0.4)
+    assert scenario.reference.duration == pytest.approx(first + 12 * 0.2 / 0.4)
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
