@@ -9,7 +9,7 @@ from pathlib import Path
 import msgspec
 
 from dikbench.invariants.of_rows import INVARIANTS
-from dikbench.results.reading import read_results
+from dikbench.results.reading import read_results, without_attributes
 from dikbench.run.runner import RunSettings, run_study
 from dikbench.scenario.oracle import ORACLES
 from dikbench.study.study import Cells, Study
@@ -50,6 +50,6 @@ def check_benchmark(
         DikbenchError: as `run_study`.
     """
     run_study(with_straw_laws(study), out, settings, command)
-    rows = read_results(out).trials
+    rows = without_attributes(read_results(out)).trials
     for invariant in INVARIANTS:
         yield Checked(invariant.sentence, tuple(invariant.broken(rows)))

@@ -11,8 +11,10 @@ import numpy as np
 import pandas as pd
 
 from dikbench.metrics import Judgement, Outcome
-from dikbench.scenario.oracle import ORACLE, SLOWED_ORACLE
+from dikbench.report.conclusions import conclusions
+from dikbench.scenario.oracle import ORACLE, ORACLES, SLOWED_ORACLE
 from dikbench.scenario.violation import SPEED_TOLERANCE
+from dikbench.simulation.status import Status
 from dikbench.statistics.failures import ran
 from dikbench.statistics.success import DONE, counted, rates, succeeded, with_facts
 from dikbench.testing.straw import STRAW_LAWS
@@ -131,6 +133,32 @@ def _outcomes_add_up(rows: pd.DataFrame) -> Iterator[str]:
     yield from _named(skipped[skipped["outcome"].isin(known)], "outcome")
 
 
+def _straw_laws_change_no_conclusion(rows: pd.DataFrame) -> Iterator[str]:
+    alone, together = conclusions(rows[~is_straw(rows)]), conclusions(rows)
+    yield from (f"only without straw laws: {line}" for line in alone if line not in together)
+    yield from (f"only with straw laws: {line}" for line in together if line not in alone)
+
+
+def _one_failure_is_named(rows: pd.DataFrame) -> Iterator[str]:
+    """One trial that did not run: conclusions are drawn, and say so of that formulation alone."""
+    competing = rows[~rows["formulation"].isin(ORACLES) & ~is_straw(rows)]
+    whole = ran(competing)
+    if whole.empty or whole["outcome"].isin([Outcome.DID_NOT_RUN.value]).any():
+        return
+    place = whole.index[0]
+    broken = competing.copy()
+    broken.loc[place, ["status", "outcome", "decided_before"]] = [
+        Status.CRASHED.value, Outcome.DID_NOT_RUN.value, Outcome.DID_NOT_RUN.value,
+    ]  # fmt: skip
+    said = [line for line in conclusions(broken) if line.startswith("Broke off")]
+    name = str(whole.loc[place, "formulation"])
+    others = set(whole["formulation"]) - {name}
+    if len(said) != 1 or f"`{name}`" not in said[0]:
+        yield f"a crash of {name} is not named: {said}"
+    elif any(f"`{other}`" in said[0] for other in others):
+        yield f"others are named: {said[0]}"
+
+
 def _rates_keep(rows: pd.DataFrame) -> Iterator[str]:
     """Renamed, in another order, every scenario twice: the rates are the same."""
     trials = with_facts(rows)
@@ -171,6 +199,8 @@ INVARIANTS: Final = (
     Invariant("Who shakes, or breaks limits, never succeeds", _shakers_and_the_reckless_fail),
     Invariant("Success does not fall when the tolerance grows", _success_grows_with_tolerance),
     Invariant("Every trial that ran has one outcome, and no other has", _outcomes_add_up),
+    Invariant("Straw laws change no sentence and no star", _straw_laws_change_no_conclusion),
+    Invariant("A single trial that did not run is named, alone", _one_failure_is_named),
     Invariant("Rates do not depend on names, order or repetition", _rates_keep),
 )
 """Every invariant of rows."""

@@ -7,7 +7,7 @@ scenarios that a known motion can do; of the others nobody knows whether anythin
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -74,6 +74,9 @@ class Rates:
     """The rates of success of formulations over the same cases.
 
     Attributes:
+        layout: the place of each trial in matrices of cases x formulations.
+        base: weight of each case, (n,).
+        drawn: weights of the cases in each resample, (resamples, n).
         contenders: a row per formulation and solver.
         rate: the rate of each, (k,); NaN where it ran no trial.
         trials: number of its trials, (k,).
@@ -83,6 +86,9 @@ class Rates:
         best: whether it is, or cannot be told apart from, the best of those that ran every case.
     """
 
+    layout: TrialMatrix
+    base: Array
+    drawn: Array
     contenders: pd.DataFrame
     rate: Array
     trials: Array
@@ -110,18 +116,34 @@ def rates(trials: pd.DataFrame, done: Mask) -> Rates:
     rate, ran_there = _means(matrix, base), ~np.isnan(matrix)
     whole: Mask = np.asarray(ran_there.all(axis=0))
     competes: Mask = whole & ~layout.contenders["formulation"].isin(ORACLES).to_numpy()
-    difference, lower, upper = (np.full(len(rate), np.nan) for _ in range(3))
-    best = np.zeros(len(rate), dtype=bool)
-    if competes.any():
-        first = int(np.flatnonzero(competes)[rate[competes].argmax()])
-        drawn = draw_weights(list(cases["scenario_family"]), list(cases["scenario"])) * base
-        differences = matrix - matrix[:, [first]]
-        difference = _means(differences, base)
-        lower, upper = _intervals(differences, drawn)
-        best = np.asarray(competes & (upper >= 0) & (rate > 0))
-    return Rates(
-        layout.contenders, rate, ran_there.sum(axis=0), whole, difference, lower, upper, best
-    )
+    nothing = np.full(len(rate), np.nan)
+    drawn = draw_weights(list(cases["scenario_family"]), list(cases["scenario"])) * base
+    found = Rates(
+        layout, base, drawn, layout.contenders, rate, ran_there.sum(axis=0), whole,
+        nothing, nothing, nothing, np.zeros(len(rate), dtype=bool),
+    )  # fmt: skip
+    if not competes.any():
+        return found
+    first = int(np.flatnonzero(competes)[rate[competes].argmax()])
+    difference, lower, upper = paired_means(matrix - matrix[:, [first]], found)
+    best: Mask = np.asarray(competes & (upper >= 0) & (rate > 0))
+    return replace(found, difference=difference, lower=lower, upper=upper, best=best)
+
+
+def paired_means(differences: Array, found: Rates) -> tuple[Array, Array, Array]:
+    """Compute hierarchical means of paired differences and their 95 % intervals, (k,) each.
+
+    Args:
+        differences: of each case and formulation, (n, k); NaN where one of the two has no value.
+        found: the rates whose cases these are.
+    """
+    means = _means(differences, found.base)
+    resampled = _means(differences, found.drawn)
+    tails = ((1 - INTERVAL_COVERAGE) / 2, (1 + INTERVAL_COVERAGE) / 2)
+    lower, upper = np.full((2, len(means)), np.nan)
+    defined = ~np.isnan(means)
+    lower[defined], upper[defined] = np.nanquantile(resampled[:, defined], tails, axis=0)
+    return means, lower, upper
 
 
 def hierarchical_weights(cases: pd.DataFrame) -> Array:
@@ -152,11 +174,3 @@ def _means(values: Array, weights: Array) -> Array:
             weights @ defined.astype(float)
         )
     return means
-
-
-def _intervals(values: Array, weights: Array) -> tuple[Array, Array]:
-    """Compute the percentile intervals of the weighted means of columns, (k,) each."""
-    means = _means(values, weights)
-    tails = ((1 - INTERVAL_COVERAGE) / 2, (1 + INTERVAL_COVERAGE) / 2)
-    lower, upper = np.nanquantile(means, tails, axis=0)
-    return lower, upper

@@ -11,7 +11,7 @@ import pytest
 from dikbench.invariants import INVARIANTS, Invariant, with_straw_laws
 from dikbench.invariants.of_rows import is_straw
 from dikbench.metrics import Outcome
-from dikbench.results.reading import read_results
+from dikbench.results.reading import read_results, without_attributes
 from dikbench.run.runner import RunSettings, run_study
 from dikbench.study.study import Cells, Study
 
@@ -42,7 +42,7 @@ def rows(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
     """Run the study once, with straw laws."""
     out = tmp_path_factory.mktemp("invariants")
     run_study(with_straw_laws(STUDY), out, RunSettings(jobs=2, traces="none"), "test")
-    return read_results(out).trials
+    return without_attributes(read_results(out)).trials
 
 
 @pytest.mark.parametrize("invariant", INVARIANTS, ids=lambda each: each.sentence)
