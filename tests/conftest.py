@@ -1,8 +1,25 @@
-"""One thread for linear algebra in every test, as in a worker: matrices are small."""
+"""One thread for linear algebra, as in a worker; bytecode for the many processes; workers."""
 
 from __future__ import annotations
 
 import os
 
+import pytest
+
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(variable, "1")  # before numpy is imported
+
+# Hundreds of processes start; without bytecode each would compile dikbench and Pinocchio again,
+# which takes longer than all else that it does.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+MOST_WORKERS = 4
+"""Each takes 0.6 GB."""
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """Share the tests among a worker per core; a file or `-k` is not worth their start."""
+    selected = config.option.keyword or any(".py" in given for given in config.args)
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return 0 if selected else min(cores or 1, MOST_WORKERS)

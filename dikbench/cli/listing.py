@@ -5,6 +5,8 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
+from typing import Final
 
 import numpy as np
 
@@ -21,12 +23,19 @@ from dikbench.plugins.finding import (
 )
 from dikbench.report.tables.kinds import kinds_with
 from dikbench.robots.catalogue import ROBOTS, load_robot
-from dikbench.scenario.oracle import ORACLE
+from dikbench.scenario.oracle import ORACLE, ORACLES, SLOWED_ORACLE
 from dikbench.scenario.scenario import Scenario
 from dikbench.selector import parse_selector
 from dikbench.solvers.catalogue.back_ends import BACK_ENDS, DEFAULT_SOLVER, is_installed
 from dikbench.solvers.catalogue.presets import TOLERANCES
 from dikbench.study.study import load_study, shipped_studies
+
+ORACLE_SUMMARIES: Final = MappingProxyType(
+    {
+        ORACLE: "Not a formulation: the exact joint motion of a scenario, scored like one",
+        SLOWED_ORACLE: "Not a formulation: a joint motion slowed down until it keeps all limits",
+    }
+)
 
 
 def listing(subject: str) -> list[str]:
@@ -49,13 +58,12 @@ def _bracketed(source: str) -> str:
 
 def _formulations() -> list[tuple[str, str, str]]:
     formulations = plugins("formulation").values()
-    summary = "Not a formulation: the exact joint motion of a scenario, scored like one"
     return [
         *(
             (formulation.name, formulation.summary.rstrip("."), formulation.source)
             for formulation in formulations
         ),
-        (ORACLE, summary, ""),
+        *((name, summary, "") for name, summary in ORACLE_SUMMARIES.items()),
     ]
 
 
@@ -100,8 +108,8 @@ def description(text: str) -> str:
     """
     selector = parse_selector(text)
     name = selector.name
-    if name == ORACLE:
-        return f"{ORACLE}: {_formulations()[-1][1]}"
+    if name in ORACLES:
+        return f"{name}: {ORACLE_SUMMARIES[name]}"
     kind = kind_in_file(name) if in_file(name) else None
     if kind == "formulation" or name in plugins("formulation"):
         return _plugin(formulation_plugin(name), "tuned")

@@ -1,46 +1,28 @@
-"""The outcome of a trial: whether the robot did its job, and if not, what came first in the way."""
+"""The outcome of a trial: whether the robot did its job, and if not, what was first in the way."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Final
+from types import MappingProxyType
+from typing import Any, Final
 
-import numpy as np
+from dikbench.scenario.witness import Feasible
 
-from dikbench.arrays import Array, Mask
-from dikbench.metrics.chatter import chattering
-from dikbench.metrics.motion import Motion
-from dikbench.scenario.witness import INSIDE_SHARE, Feasible, outside
-from dikbench.simulation.status import Status
-
-COLLISION_TOLERANCE_M: Final = 1e-3
-"""A distance may fall short of its margin by this."""
-
-SPEED_TOLERANCE: Final = 1.001
-"""Joint speeds may be this many times their limit."""
-
-ACCELERATION_TOLERANCE: Final = 1.01
-"""Joint accelerations may be this many times theirs."""
-
-TORQUE_TOLERANCE: Final = 1.001
-"""Joint torques may be this many times theirs."""
-
-POSITION_TOLERANCE: Final = 1e-3
-"""A joint may be so far outside its position limits [rad or m]."""
-
-CHATTER_SHARE: Final = 0.05
-"""A motion chatters that does so in more than this share of its steps ..."""
-
-CHATTER_STEPS: Final = 10
-"""... and in at least so many of them."""
+NAN: Final = float("nan")
 
 RECOVERY_TOLERANCES: Final = 10
 """Who recovers may be off the path, or leave out of it, by so many tolerances ..."""
 
 RECOVERY_SHARE: Final = 0.25
 """... and by at most this share of the path's extent."""
+
+DONE_BY_CLOCK_SHARE: Final = 0.90
+"""Share of a path that must be done where the reference moves with the clock."""
+
+DONE_SHARE: Final = 0.99
+"""Share of it that must be done where the reference waits, and by who recovers."""
 
 
 class Outcome(StrEnum):
@@ -98,13 +80,13 @@ class Judgement:
     by_clock: bool
     has_path: bool
     feasible: Feasible
-    off_path: Verdict
-    end: Verdict
-    done_99: float
-    done_90: float
-    in_time: float
-    extent: float
-    chatter: Verdict | None
+    off_path: Verdict = Verdict(Outcome.LEFT_PATH)
+    end: Verdict = Verdict(Outcome.UNFINISHED)
+    done_99: float = NAN
+    done_90: float = NAN
+    in_time: float = NAN
+    extent: float = 0.0
+    chatter: Verdict | None = None
 
     def at(self, tolerance: float) -> Verdict:
         """Decide the outcome at a tolerance [m]."""
@@ -121,7 +103,9 @@ class Judgement:
             return
         if self.off_path.figure > tolerance:
             yield self.off_path
-        share, needed = (0.90, self.done_90) if self.by_clock else (0.99, self.done_99)
+        share, needed = DONE_SHARE, self.done_99
+        if self.by_clock:
+            share, needed = DONE_BY_CLOCK_SHARE, self.done_90
         if needed > tolerance:
             reason = f"tolerance [m] at which {share:.0%} of the path are done"
             yield Verdict(Outcome.UNFINISHED, self.end.step, needed, reason)
@@ -141,104 +125,70 @@ class Judgement:
             if figure > most:
                 yield Verdict(Outcome.NOT_RECOVERED, step, figure, reason)
 
+    def columns(self, tolerance: float) -> dict[str, Any]:
+        """Return what a row of results keeps: the outcome at a tolerance [m], and all of `at`."""
+        verdict = self.at(tolerance)
+        return {
+            "outcome": verdict.outcome.value,
+            "outcome_step": verdict.step,
+            "outcome_figure": verdict.figure,
+            "outcome_reason": verdict.reason,
+            "decided_before": "" if self.before is None else self.before.outcome.value,
+            "chatters": float(self.chatter is not None),
+            "judged_by_path": float(self.has_path),
+            "off_path_by": self.off_path.reason,
+            "path_extent_m": self.extent,
+            "tolerance_m": tolerance,
+            "feasible": self.feasible,
+        }
 
-def judge(motion: Motion, status: Status, feasible: Feasible = "time") -> Judgement:
-    """Judge a motion of at least one step.
-
-    Args:
-        motion: the motion.
-        status: how the run ended.
-        feasible: what a motion is known for in its scenario.
-    """
-    scenario, along = motion.scenario, motion.along_path
-    has_path = along is not None and scenario.judged == "path"
-    nan = float("nan")
-    done_99, done_90, in_time = along.tolerances if along is not None else (nan, nan, nan)
-    extent = 0.0
-    if along is not None:
-        extent = float(np.linalg.norm(along.path.points - along.path.points[0], axis=1).max())
-    last = motion.trace.steps
-    away = float(motion.tracking_error[last])
-    return Judgement(
-        before=_before_any_tolerance(motion, status),
-        by_clock=motion.trace.mode == "time",
-        has_path=has_path,
-        feasible=feasible,
-        off_path=_off_path(motion),
-        end=Verdict(Outcome.UNFINISHED, last, away, "distance [m] from the target at the end"),
-        done_99=done_99,
-        done_90=done_90,
-        in_time=in_time,
-        extent=extent,
-        chatter=_chatter(motion),
-    )
-
-
-def _before_any_tolerance(motion: Motion, status: Status) -> Verdict | None:
-    """What is decided whatever the tolerance: a run that broke off, a collision, a limit."""
-    last = motion.trace.steps
-    if status is Status.DIVERGED:
-        return Verdict(Outcome.DIVERGED, last)
-    if status is not Status.OK:
-        return Verdict(Outcome.DID_NOT_RUN, last, reason=status.value)
-    hit = motion.clearance < -COLLISION_TOLERANCE_M
-    if hit.any():
-        return _first(Outcome.COLLIDED, hit, -motion.clearance, "distance [m] below its margin")
-    broken = [
-        _first(Outcome.LIMIT_BROKEN, values > most, values, reason)
-        for values, most, reason in _shares_of_limits(motion)
-        if (values > most).any()
-    ]
-    trace, reference = motion.trace, motion.scenario.reference
-    late = trace.dt * np.arange(trace.steps + 1) >= INSIDE_SHARE * reference.duration
-    outside_by = outside(motion.scenario.robot, trace.q, late, POSITION_TOLERANCE)
-    if (outside_by > 0).any():
-        reason = "distance [rad or m] of a joint outside what it may be"
-        broken.append(_first(Outcome.LIMIT_BROKEN, outside_by > 0, outside_by, reason))
-    return min(broken, key=lambda verdict: verdict.step) if broken else None
+    @classmethod
+    def of_row(cls, row: Mapping[str, Any]) -> Judgement:
+        """Make the judgement of a row of results, without the steps that decided."""
+        before, chatters = row["decided_before"], bool(row["chatters"])
+        return cls(
+            before=Verdict(Outcome(before)) if before else None,
+            by_clock=row["reference"] == "time",
+            has_path=bool(row["judged_by_path"]),
+            feasible=row["feasible"],
+            off_path=Verdict(
+                Outcome.LEFT_PATH, -1, row["contour_error_6d_max_m"], row["off_path_by"]
+            ),
+            end=Verdict(Outcome.UNFINISHED, -1, row["tracking_error_6d_final_m"]),
+            done_99=row["path_done_99_tolerance_m"],
+            done_90=row["path_done_90_tolerance_m"],
+            in_time=row["lag_tolerance_m"],
+            extent=row["path_extent_m"],
+            chatter=Verdict(Outcome.CHATTERING) if chatters else None,
+        )
 
 
-def _shares_of_limits(motion: Motion) -> list[tuple[Array, float, str]]:
-    """Return speed, acceleration and torque over their limits in each step, (n,); and the most."""
-    limits, v = motion.scenario.robot.limits, motion.trace.applied
-    shares = []
-    if limits.velocity is not None:
-        usage = limits.velocity.usage(v).max(axis=1, initial=0.0)
-        shares.append((usage, SPEED_TOLERANCE, "joint speed over its limit"))
-    if limits.acceleration is not None:
-        usage = limits.acceleration.usage(motion.accelerations).max(axis=1, initial=0.0)
-        shares.append((usage, ACCELERATION_TOLERANCE, "joint acceleration over its limit"))
-    if len(motion.torque_usage):
-        shares.append((motion.torque_usage, TORQUE_TOLERANCE, "joint torque over its limit"))
-    return shares
+OUTCOME_TEXTS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "outcome": "whether the robot did its job, and if not, what was first in the way",
+        "outcome_reason": "what `outcome_figure` is of",
+        "decided_before": "outcome that was decided before any tolerance; empty where none was",
+        "off_path_by": "whether the largest distance from the path is by position or orientation",
+        "feasible": "what a motion is known for that keeps all limits: time, path, no or unknown",
+        "situation": "what is difficult about the scenario",
+        "robot": "name of the robot",
+    }
+)
+"""Columns of outcomes that are texts, and what they say."""
 
-
-def _off_path(motion: Motion) -> Verdict:
-    """Say where the motion is farthest from its path, and whether by position or orientation."""
-    step = int(motion.contour_error_6d.argmax())
-    figure = float(motion.contour_error_6d[step])
-    path, linear = motion.scenario.embedded_path, len(motion.scenario.embedding.linear)
-    if path is None:
-        return Verdict(Outcome.LEFT_PATH, step, figure, "position")
-    _, pieces, shares = motion.nearest_on_path
-    foot = path.points[pieces[step]] + shares[step] * path.pieces[pieces[step]]
-    away = motion.points[step] - foot
-    by_position = np.linalg.norm(away[:linear]) >= np.linalg.norm(away[linear:])
-    return Verdict(Outcome.LEFT_PATH, step, figure, "position" if by_position else "orientation")
-
-
-def _chatter(motion: Motion) -> Verdict | None:
-    """What is decided after any tolerance."""
-    mask = chattering(motion)
-    count = int(np.count_nonzero(mask))
-    if count < CHATTER_STEPS or count <= CHATTER_SHARE * len(mask):
-        return None
-    return Verdict(
-        Outcome.CHATTERING, int(mask.argmax()), count / len(mask), "share of the steps that chatter"
-    )
-
-
-def _first(outcome: Outcome, mask: Mask, values: Array, reason: str) -> Verdict:
-    """Decide by the first step of a mask."""
-    step = int(mask.argmax())
-    return Verdict(outcome, step, float(values[step]), reason)
+OUTCOME_NUMBERS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
+    {
+        "outcome_step": ("", "step that decided the outcome; -1 where none did"),
+        "outcome_figure": ("", "value that decided it, in what `outcome_reason` says"),
+        "chatters": ("", "whether it chatters, which decides after any tolerance (1, 0)"),
+        "judged_by_path": ("", "whether the whole path is judged, or the end alone (1, 0)"),
+        "path_extent_m": ("m", "largest distance of the path from its start (L = 0.2 m)"),
+        "tolerance_m": ("m", "tolerance of the scenario, at which `outcome` is decided"),
+        "coped": ("", "where nothing can follow: whether limits were kept, the path done as far as "
+                  "can be, and its end reached where it can be (1, 0)"),
+        "followable_until_s": ("s", "nominal time of the exact motion's first break of a position "
+                               "limit or a distance; empty where it keeps all"),
+        "speed_need": ("", "largest joint speed of the exact motion over its limit"),
+    }
+)  # fmt: skip
+"""Columns of outcomes that are numbers: unit, and what they say."""

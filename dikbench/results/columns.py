@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
+from dikbench.metrics import OUTCOME_NUMBERS, OUTCOME_TEXTS
+
 TRIAL: Final = ["formulation", "solver", "scenario", "plant", "reference", "seed"]
 """Columns that identify the trial of a row."""
 
@@ -89,6 +91,8 @@ DESCRIBED: Final = MappingProxyType(
         "status": ("", "how the trial ended"),
         "message": ("", "why, where it did not end well"),
         "steps": ("", "number of control steps"),
+        **{name: ("", text) for name, text in OUTCOME_TEXTS.items()},
+        **OUTCOME_NUMBERS,
         **{name: ("", text) for name, text in SEES.items()},
         "wall_time_s": ("s", "time of the trial in its worker"),
         "control_time_s": ("s", "of it in kinematics, formulation and solver"),

@@ -11,13 +11,20 @@ from typing import Any, Final
 import pandas as pd
 
 from dikbench.errors import DikbenchError
+from dikbench.metrics import OUTCOME_TEXTS
 from dikbench.results.columns import KEYS, REDEFINED, RENAMED, RENAMED_METRICS
 
 TRIALS: Final = "trials.csv"
 PARQUET: Final = "trials.parquet"
 MANIFEST: Final = "manifest.json"
 
-TEXT: Final = ("id", *(key for key in KEYS if key != "seed"), "environment", "timing_stability")
+TEXT: Final = (
+    "id",
+    *(key for key in KEYS if key != "seed"),
+    *OUTCOME_TEXTS,
+    "environment",
+    "timing_stability",
+)
 NEEDED: Final = tuple(name for name in KEYS if name != "message")
 """Columns that every row must have."""
 

@@ -11,7 +11,7 @@ import msgspec
 import pandas as pd
 
 from dikbench.errors import DikbenchError
-from dikbench.metrics import METRICS
+from dikbench.metrics import METRICS, OUTCOME_NUMBERS, OUTCOME_TEXTS
 from dikbench.results.columns import DESCRIBED, KEYS, SEES, SELECTORS, TIMES
 from dikbench.results.exports import MANIFEST, are_exported, read_manifest, read_trials
 from dikbench.results.folder import ResultsFolder
@@ -20,11 +20,12 @@ from dikbench.results.step_frames import steps_of
 from dikbench.results.store import OtherVersion
 from dikbench.selector import parse_selector
 
-TEXTS: Final = ("id", *KEYS, "environment", "timing_stability")
+TEXTS: Final = ("id", *KEYS, *OUTCOME_TEXTS, "environment", "timing_stability")
 NUMBERS: Final = (
     "seed",
     "steps",
     *METRICS,
+    *OUTCOME_NUMBERS,
     *SEES,
     "wall_time_s",
     "control_time_s",
@@ -139,7 +140,8 @@ def read_results(path: Path, *, lenient: bool = False) -> Results:
         trials = with_selected(trials)
     except DikbenchError as error:
         raise DikbenchError(f"{path}: {error}") from None
-    return Results(folder, manifest, _described(trials), tuple(notes))
+    # Columns that were added one by one lie apart, which pandas warns about.
+    return Results(folder, manifest, _described(trials.copy()), tuple(notes))
 
 
 def _stored_or_exported(

@@ -32,6 +32,10 @@ class Status(Enum):
         "The solver claimed success, the recomputed residuals say otherwise.",
     )
     DIVERGED = ("diverged", "The motion left all bounds; the trial was ended.")
+    PROTECTIVE_STOP = (
+        "protective-stop",
+        "The plant stopped the robot at the first limit or distance that was broken.",
+    )
     FORMULATION_ERROR = (
         "formulation-error",
         "The formulation raised an error that is not an answer.",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from makers.shared import made_once
 
 from dikbench.report.write import write_report
 from dikbench.run.runner import RunSettings, run_study
@@ -14,7 +15,10 @@ from dikbench.study.study import Selection, load_study, select
 @pytest.fixture(scope="session")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a small run with every kind of law, a skipped pair and a path-indexed run."""
-    out = tmp_path_factory.mktemp("run") / "out"
+    return made_once(tmp_path_factory, "smoke", _run)
+
+
+def _run(out: Path) -> None:
     selection = Selection(
         scenarios=("reach", "near-miss[miss=0.02]"), references=("time", "path"), seeds=(0, 1)
     )
@@ -22,4 +26,3 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
         select(load_study("smoke"), selection, named=True), out, RunSettings(jobs=2), "a test"
     )
     write_report(out)
-    return out

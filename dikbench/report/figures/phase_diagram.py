@@ -22,7 +22,7 @@ from dikbench.report.selection.categories import CATEGORIES, OFF_COURSE, SLOW, c
 from dikbench.report.selection.declared import with_unit
 from dikbench.report.selection.phase_grids import PhaseGrid, phase_grids
 from dikbench.report.selection.rows import error_column, failures_at_infinity, how, pages
-from dikbench.scenario.oracle import ORACLE
+from dikbench.scenario.oracle import ORACLES
 
 PER_PAGE = 20
 """Formulations in one figure."""
@@ -85,7 +85,7 @@ def _formulations_in_order(rows: pd.DataFrame) -> list[str]:
         {"outcome": by_formulation["outcome"].mean(), "error": by_formulation["error"].median()}
     )
     order = table.sort_values(["outcome", "error"], kind="stable").index
-    return sorted(order, key=lambda name: name != ORACLE)
+    return sorted(order, key=lambda name: name not in ORACLES)
 
 
 def _maps(grid: PhaseGrid) -> list[_Map]:

@@ -15,7 +15,7 @@ from dikbench.arrays import Array
 from dikbench.report.drawing.figure import Figure
 from dikbench.report.drawing.style import WIDTH, logarithmic, look, save, short
 from dikbench.report.selection.rows import LEAST_ERROR, how, one_solver_each
-from dikbench.scenario.oracle import ORACLE
+from dikbench.scenario.oracle import ORACLES
 from dikbench.statistics.data_profile import data_profile
 from dikbench.statistics.failures import has_failed, ran
 from dikbench.statistics.performance_profile import area, performance_ratios, profile
@@ -50,7 +50,7 @@ def draw_profiles(trials: pd.DataFrame, target: Path) -> list[Figure]:
         trials: the rows of trials.csv, skipped and failed ones too.
         target: the folder of figures.
     """
-    contenders = one_solver_each(ran(trials[trials["formulation"] != ORACLE]))
+    contenders = one_solver_each(ran(trials[~trials["formulation"].isin(ORACLES)]))
     ways = [(how(rows), rows) for _, rows in contenders.groupby(["plant", "reference"], sort=False)]
     figures: list[Figure] = []
     for name, rows in ways:

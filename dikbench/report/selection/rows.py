@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from dikbench.report.drawing.style import contender_name
-from dikbench.scenario.oracle import ORACLE
+from dikbench.scenario.oracle import ORACLES
 
 LEAST_ERROR = 1e-5
 """Nothing below this [m] is drawn: the axes are logarithmic."""
@@ -74,7 +74,7 @@ def ranked(rows: pd.DataFrame, column: str) -> list[str]:
     worth = rows.assign(worth=failures_at_infinity(rows, column))
     medians = worth.groupby("formulation", sort=False)["worth"].median()
     order = medians.sort_values(kind="stable", na_position="last").index
-    return sorted(order, key=lambda name: name != ORACLE)
+    return sorted(order, key=lambda name: name not in ORACLES)
 
 
 def pages(names: Sequence[str], most: int) -> list[list[str]]:

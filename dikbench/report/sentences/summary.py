@@ -19,7 +19,7 @@ from dikbench.report.sentences.findings import (
     stay_on_course,
 )
 from dikbench.report.sentences.words import Names, several
-from dikbench.scenario.oracle import ORACLE
+from dikbench.scenario.oracle import ORACLES
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def summarise(trials: pd.DataFrame) -> Summary:
     Args:
         trials: the rows of trials.csv.
     """
-    contenders = trials[trials["formulation"].ne(ORACLE) & trials["status"].ne("skipped")]
+    contenders = trials[~trials["formulation"].isin(ORACLES) & trials["status"].ne("skipped")]
     if contenders.empty:
         return Summary("No formulation was run.")
     plant = _first(contenders["plant"], "ideal")

@@ -14,7 +14,7 @@ from dikbench.arrays import Array, Mask
 from dikbench.metrics import METRICS
 from dikbench.report.tables.kinds import Quantity, Statistic
 from dikbench.report.tables.table import DIGITS, Column, TableCell
-from dikbench.scenario.oracle import ORACLE
+from dikbench.scenario.oracle import ORACLES
 from dikbench.statistics.hierarchical_bootstrap import draw_weights, mean_intervals
 from dikbench.statistics.shifted_mean import shift_near_median, shifted_geometric_mean
 from dikbench.statistics.trial_matrix import TrialMatrix
@@ -103,7 +103,7 @@ class Sample:
         The average over the scenarios that a formulation survived is no win. The oracle is no
         formulation.
         """
-        contender = (self.layout.contenders["formulation"] != ORACLE).to_numpy()
+        contender = ~self.layout.contenders["formulation"].isin(ORACLES).to_numpy()
         came_through = self.layout.fill(1 - self.rows["failed"].to_numpy(dtype=float), 0.0) > 0
         has = ~np.isnan(matrix)
         asked = (has & came_through)[:, contender].any(axis=1, keepdims=True)

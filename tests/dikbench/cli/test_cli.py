@@ -13,7 +13,9 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from click.testing import CliRunner, Result
 
+from dikbench.cli import commands
 from dikbench.cli.listing import listing
 from dikbench.metrics import METRICS
 from dikbench.plugins.finding import plugins
@@ -36,22 +38,25 @@ class MyLaw:
 '''
 
 
-def dikbench(
-    *arguments: str, cwd: Path, path: Path | None = None
-) -> subprocess.CompletedProcess[str]:
+def dikbench(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     """Run the command line in a process of its own."""
-    environment = dict(os.environ)
-    if path is not None:
-        environment["PYTHONPATH"] = str(path)
     return subprocess.run(
         [sys.executable, "-c", "from dikbench.cli import main; main()", *arguments],
         capture_output=True,
         text=True,
         cwd=cwd,
-        env=environment,
         timeout=300,
         check=False,
     )
+
+
+def in_process(*arguments: str) -> Result:
+    """Run the command line in this process, where all is imported already; only workers start."""
+    handler = signal.getsignal(signal.SIGTERM)  # `dikbench run` sets its own
+    try:
+        return CliRunner().invoke(commands, [*arguments])
+    finally:
+        signal.signal(signal.SIGTERM, handler)
 
 
 def test_help_does_not_import_anything_heavy() -> None:
@@ -129,7 +134,9 @@ for stream, kept in enumerate(streams, start=1):
 that ends in an error is taken by imports."""
 
 
-def run_all(folder: Path, commands: Sequence[Sequence[str]]) -> list[Path]:
+def run_all(
+    folder: Path, commands: Sequence[Sequence[str]], path: Path | None = None
+) -> list[Path]:
     """Run commands; of each a folder with `stdout`, `stderr`, `code`, and `cwd`, where it ran."""
     folders = [folder / str(number) for number in range(len(commands))]
     for each in folders:
@@ -137,7 +144,8 @@ def run_all(folder: Path, commands: Sequence[Sequence[str]]) -> list[Path]:
         (each / "cwd" / "bad.urdf").write_text("<robot name='x'>")
         (each / "cwd" / "afile").touch()
     command = [sys.executable, "-c", ONE_AFTER_THE_OTHER, json.dumps(commands)]
-    subprocess.run(command, cwd=folder, check=True, timeout=600)
+    environment = os.environ if path is None else {**os.environ, "PYTHONPATH": str(path)}
+    subprocess.run(command, cwd=folder, env=environment, check=True, timeout=600)
     return folders
 
 
@@ -161,16 +169,13 @@ def test_malformed_input_is_one_line_and_exit_code_two(refused: list[Path], numb
     assert sorted(path.name for path in (folder / "cwd").rglob("*")) == ["afile", "bad.urdf"]
 
 
-def test_a_failed_command_touches_no_earlier_results(tmp_path: Path) -> None:
+def test_a_failed_command_touches_no_earlier_results(results: Path, tmp_path: Path) -> None:
     """A malformed second run leaves the files of the first as they were."""
     out = tmp_path / "out"
-    good = dikbench(
-        "run", "--formulation", "dls", "--scenario", "reach", "--plant", "ideal",
-        "--out", str(out), cwd=tmp_path,
-    )  # fmt: skip
-    assert good.returncode == 0, good.stderr
+    shutil.copytree(results, out)
     before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
-    assert dikbench("run", "--formulation", "dlss", "--out", str(out), cwd=tmp_path).returncode == 2
+    assert len(before) > 10
+    assert in_process("run", "--formulation", "dlss", "--out", str(out)).exit_code == 2
     assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
 
 
@@ -187,37 +192,29 @@ def test_a_plugin_of_another_project_is_listed_and_runs(tmp_path: Path) -> None:
     (info / "entry_points.txt").write_text(
         "[dikbench.formulations]\nmine = my_laws\n[dikbench.scenarios]\nmine = my_scenarios\n"
     )
-    listed = dikbench("list", cwd=tmp_path, path=site)
-    assert listed.returncode == 0, listed.stderr
-    assert "my-formulation" in listed.stdout
-    assert "my-family" in listed.stdout
-    done = dikbench(
-        "run", "--formulation", "my-formulation[gain=2]", "--scenario", "my-family[distance=0.1]",
-        "--plant", "ideal", "--out", "out", cwd=tmp_path, path=site,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    trials = pd.read_csv(tmp_path / "out" / "trials.csv")
+    scenario = "my-family[distance=0.1,duration=0.2]"
+    run = ("run", "--formulation", "my-formulation[gain=2]", "--scenario", scenario)
+    listed, ran = run_all(
+        tmp_path, [("list",), (*run, "--plant", "ideal", "--jobs", "1", "--out", "out")], path=site
+    )
+    assert "my-formulation" in (listed / "stdout").read_text()
+    assert "my-family" in (listed / "stdout").read_text()
+    assert (ran / "code").read_text() == "null", (ran / "stderr").read_text()
+    trials = pd.read_csv(ran / "cwd" / "out" / "trials.csv")
     assert list(trials["formulation"]) == ["my-formulation[gain=2]"]
     assert list(trials["status"]) == ["ok"]
 
 
-def test_a_law_in_a_file_runs_without_packaging(tmp_path: Path) -> None:
-    """`path/to/file.py:Class` is resolved in each worker from its text, with parameters."""
-    (tmp_path / "my_law.py").write_text(FORMULATION)
-    done = dikbench(
-        "run", "--formulation", "my_law.py:MyLaw", "--formulation", "my_law.py:MyLaw[gain=2]",
-        "--scenario", "reach", "--out", "out", cwd=tmp_path,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    trials = pd.read_csv(tmp_path / "out" / "trials.csv")
-    assert set(trials["status"]) == {"ok"}
-    by_formulation = trials[trials["plant"] == "ideal"].set_index("formulation")["progress_mean"]
-    assert by_formulation["my_law.py:MyLaw[gain=2]"] > by_formulation["my_law.py:MyLaw"]
+def test_a_law_and_a_family_in_files_run_without_packaging(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`path/to/file.py:Class` is resolved in each worker from its text, with parameters.
 
-
-def test_a_family_in_a_file_runs_without_packaging(tmp_path: Path) -> None:
-    """`path/to/file.py:Class` as a scenario: shown, run in the workers, reported."""
-    (tmp_path / "my_reach.py").write_text(
+    The family is shown and reported as one with a name is.
+    """
+    monkeypatch.chdir(tmp_path)
+    Path("unpackaged_law.py").write_text(FORMULATION)
+    Path("unpackaged_reach.py").write_text(
         "from dataclasses import dataclass\n"
         "from scenarios.reach import Reach\n"
         "@dataclass(frozen=True, kw_only=True)\n"
@@ -226,16 +223,20 @@ def test_a_family_in_a_file_runs_without_packaging(tmp_path: Path) -> None:
         "    distance: float = 0.05\n"
         "    duration: float = 0.5\n"
     )
-    shown = dikbench("show", "my_reach.py:Short", cwd=tmp_path)
-    assert shown.returncode == 0, shown.stderr
-    assert "distance = 0.05: 0.01 to 0.3 [m]" in shown.stdout
-    done = dikbench(
-        "run", "--formulation", "dls", "--scenario", "my_reach.py:Short[distance=0.02|0.1]",
-        "--plant", "ideal", "--out", "out", cwd=tmp_path,
+    shown = in_process("show", "unpackaged_reach.py:Short")
+    assert shown.exit_code == 0, shown.output
+    assert "distance = 0.05: 0.01 to 0.3 [m]" in shown.output
+    law = "unpackaged_law.py:MyLaw"
+    done = in_process(
+        "run", "--formulation", law, "--formulation", f"{law}[gain=2]",
+        "--scenario", "unpackaged_reach.py:Short[distance=0.02|0.1]",
+        "--plant", "ideal", "--out", "out",
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    assert done.exit_code == 0, done.output
     trials = pd.read_csv(tmp_path / "out" / "trials.csv")
-    assert list(trials["status"]) == ["ok", "ok"]
+    assert list(trials["status"]) == ["ok"] * 4
+    progress = trials.groupby("formulation")["progress_mean"].mean()
+    assert progress[f"{law}[gain=2]"] > progress[law]
     assert "A short reach" in (tmp_path / "out" / "report.html").read_text()
 
 
@@ -250,20 +251,21 @@ def test_show_prints_one_thing_in_full(tmp_path: Path) -> None:
 SHORT = ("--formulation", "dls", "--scenario", "reach[duration=0.2]", "--plant", "ideal")
 
 
-def test_time_and_status_work_on_a_folder(tmp_path: Path) -> None:
+def test_time_and_status_work_on_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Times alone first, then the trials, then what is there."""
-    timed = dikbench("time", *SHORT, "--out", "out", cwd=tmp_path)
-    assert timed.returncode == 0, timed.stderr
+    monkeypatch.chdir(tmp_path)
+    timed = in_process("time", *SHORT, "--out", "out")
+    assert timed.exit_code == 0, timed.output
     assert "Timing of one call" in timed.stdout
     assert list(pd.read_csv(tmp_path / "out" / "timing.csv")["formulation"]) == ["dls"]
-    missing = dikbench("status", "out", cwd=tmp_path)
+    missing = in_process("status", "out")
     assert missing.stdout.split() == ["1", "missing", "1", "planned"]
-    assert dikbench("run", *SHORT, "--out", "out", cwd=tmp_path).returncode == 0
-    assert dikbench("status", "out", cwd=tmp_path).stdout.split() == ["1", "ok", "1", "planned"]
-    again = dikbench("run", *SHORT, "--out", "out", cwd=tmp_path)
+    assert in_process("run", *SHORT, "--out", "out", "--jobs", "1").exit_code == 0
+    assert in_process("status", "out").stdout.split() == ["1", "ok", "1", "planned"]
+    again = in_process("run", *SHORT, "--out", "out")
     assert "1 of 1 trials are done" in again.stderr
-    nothing = dikbench("status", "nosuch", cwd=tmp_path)
-    assert nothing.returncode == 2
+    nothing = in_process("status", "nosuch")
+    assert nothing.exit_code == 2
     assert nothing.stderr.startswith("error: no results in")
     assert not (tmp_path / "nosuch").exists()
 
@@ -307,7 +309,16 @@ def test_a_full_disk_is_one_line_and_what_was_committed_is_kept(tmp_path: Path) 
     if subprocess.run(mount, capture_output=True, check=False).returncode:
         pytest.skip("mounting is not allowed here")
     try:
-        arguments = ["run", *SHORT, "--scenario", "reach", "--out", str(disk / "out")]
+        arguments = [
+            "run",
+            *SHORT,
+            "--scenario",
+            "reach",
+            "--out",
+            str(disk / "out"),
+            "--jobs",
+            "1",
+        ]
         for seed in range(30):
             arguments += ["--seed", str(seed)]
         done = dikbench(*arguments, cwd=tmp_path)

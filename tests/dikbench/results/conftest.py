@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+from makers.shared import made_once
 
 from dikbench.run.runner import RunSettings, run_study
 from dikbench.study.study import Cells, Study, TimingSettings
@@ -23,9 +24,11 @@ STUDY = Study(
 @pytest.fixture(scope="session")
 def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The results of the study."""
-    folder = tmp_path_factory.mktemp("frames")
-    run_study(STUDY, folder, RunSettings(jobs=2), "a test")
-    return folder
+    return made_once(
+        tmp_path_factory,
+        "frames",
+        lambda folder: run_study(STUDY, folder, RunSettings(jobs=2), "a test"),
+    )
 
 
 @pytest.fixture(scope="session")

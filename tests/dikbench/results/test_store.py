@@ -9,6 +9,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,14 +17,18 @@ from typing import Any
 import msgspec
 import pandas as pd
 import pytest
+from makers.plugins import law_with
+from makers.shared import made_once
 
 from dikbench.errors import DikbenchError
 from dikbench.results.folder import ResultsFolder
 from dikbench.results.reading import load_results
 from dikbench.results.store import Store
+from dikbench.run import runner
 from dikbench.run.runner import RunSettings, run_study, status_of, time_study
+from dikbench.run.trial_row import TracePolicy, run_trial
 from dikbench.study.identity import timing_id, trial_id
-from dikbench.study.plan import expand
+from dikbench.study.plan import PlannedTrial, expand
 from dikbench.study.study import Cells, Study, TimingSettings
 from dikbench.study.trial import Trial
 
@@ -56,9 +61,34 @@ def first_row(store: Store) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The results of the study, run once and left alone."""
-    folder = tmp_path_factory.mktemp("undisturbed")
-    run_study(STUDY, folder, RunSettings(jobs=2), "a test")
-    return folder
+    return made_once(
+        tmp_path_factory,
+        "undisturbed",
+        lambda folder: run_study(STUDY, folder, RunSettings(jobs=2), "a test"),
+    )
+
+
+SCRIPT = """
+import sys
+from pathlib import Path
+sys.path.insert(0, {folder!r})
+from study_of_test import STUDY
+from dikbench.run.runner import RunSettings, run_study
+
+if __name__ == "__main__":
+    run_study(STUDY, Path({out!r}), RunSettings(jobs={jobs}), "a script")
+"""
+
+
+def script_of(study: Study, folder: Path, jobs: int) -> list[str]:
+    """The command that runs a study into `out` in this folder, in a process of its own."""
+    (folder / "study_of_test.py").write_text(
+        "import msgspec\nfrom dikbench.study.study import Study\n"
+        f"STUDY = msgspec.convert({msgspec.to_builtins(study)!r}, Study)\n"
+    )
+    script = folder / "script.py"
+    script.write_text(SCRIPT.format(folder=str(folder), out=str(folder / "out"), jobs=jobs))
+    return [sys.executable, str(script)]
 
 
 def test_every_export_holds_every_trial(undisturbed: Path) -> None:
@@ -100,11 +130,13 @@ def test_the_same_trial_has_the_same_id_however_it_is_spelt() -> None:
     assert len({timing_id(t.formulation, t.solver, t.scenario) for t in (TRIAL, spelt_out)}) == 1
 
 
-def test_the_same_command_runs_only_what_is_missing(undisturbed: Path) -> None:
+def test_the_same_command_runs_only_what_is_missing(undisturbed: Path, tmp_path: Path) -> None:
     """Rows that are there keep their run; a changed study adds and deletes nothing."""
-    first = load_results(undisturbed).trials
-    run_study(STUDY, undisturbed, RunSettings(jobs=1), "again")
-    pd.testing.assert_frame_equal(load_results(undisturbed).trials, first)
+    shutil.copytree(undisturbed, tmp_path, dirs_exist_ok=True)
+    run_study(STUDY, tmp_path, RunSettings(jobs=1), "again")
+    pd.testing.assert_frame_equal(
+        load_results(tmp_path).trials, load_results(undisturbed).trials, check_exact=True
+    )
 
 
 def test_a_changed_study_adds_and_never_deletes(tmp_path: Path) -> None:
@@ -126,17 +158,14 @@ def test_a_changed_law_is_run_again_and_its_old_row_is_not_shown(tmp_path: Path)
         "        return np.full(problem.robot.nv, {})\n"
     )
     formulation = tmp_path / "still_law.py"
-    script = "import sys; from dikbench.cli import main; sys.argv = sys.argv[:1] + {!r}; main()"
+    study = msgspec.structs.replace(
+        STUDY, cells=(Cells((f"{formulation}:Still",)),), scenarios=("reach[duration=0.1]",)
+    )
+    command = script_of(study, tmp_path, 1)
     speeds = []
     for value in (0.0, 1e-3):
         formulation.write_text(source.format(value))
-        arguments = [
-            "run", "--formulation", f"{formulation}:Still", "--scenario", "reach[duration=0.1]",
-            "--plant", "ideal", "--jobs", "1", "--out", str(tmp_path / "out"),
-        ]  # fmt: skip
-        subprocess.run(
-            [sys.executable, "-c", script.format(arguments)], check=True, capture_output=True
-        )
+        subprocess.run(command, check=True, capture_output=True)
         speeds.append(load_results(tmp_path / "out").trials["joint_travel_rad"].tolist())
     assert speeds[0] == [0.0]
     assert len(speeds[1]) == 1
@@ -150,16 +179,36 @@ def test_a_changed_law_is_run_again_and_its_old_row_is_not_shown(tmp_path: Path)
     [("", 0), ("failed", 1), ("dls", 2), ("reach", 3), ("daqp[interface=warm]", 2), ("all", 6)],
 )
 def test_rerun_chooses_what_is_run_again(
-    undisturbed: Path, tmp_path: Path, rerun: str, again: int
+    undisturbed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rerun: str, again: int
 ) -> None:
     """Failed trials, those of a formulation, scenario or solver, or all."""
-    shutil.copytree(undisturbed, tmp_path, dirs_exist_ok=True)
-    with Store(tmp_path / "results.sqlite") as store:
-        row = first_row(store)
-        store.record_trial({**row, "status": "timeout"}, 1, 0)
+    chosen: list[PlannedTrial] = []
+
+    def run_nothing(todo: Sequence[PlannedTrial], *others: object) -> Iterator[Any]:
+        chosen.extend(todo)
+        return iter(())
+
+    monkeypatch.setattr(runner, "run_trials", run_nothing)
+    failed_in(undisturbed, tmp_path)
     run_study(STUDY, tmp_path, RunSettings(jobs=2, rerun=rerun), "second")
-    runs = load_results(tmp_path).trials["run"]
-    assert int((runs > 1).sum()) == again
+    assert len({p.id for p in chosen}) == len(chosen) == again
+
+
+def failed_in(undisturbed: Path, folder: Path) -> None:
+    """Copy the results, with the first trial as one that failed."""
+    shutil.copytree(undisturbed, folder, dirs_exist_ok=True)
+    with Store(folder / "results.sqlite") as store:
+        store.record_trial({**first_row(store), "status": "timeout"}, 1, 0)
+
+
+def test_what_is_run_again_has_a_new_row_in_place_of_the_old(
+    undisturbed: Path, tmp_path: Path
+) -> None:
+    """It is the row of an undisturbed run again, stamped with the second run."""
+    failed_in(undisturbed, tmp_path)
+    run_study(STUDY, tmp_path, RunSettings(jobs=1, rerun="failed"), "second")
+    assert list(load_results(tmp_path).trials["run"]) == [2, 1, 1, 1, 1, 1]
+    pd.testing.assert_frame_equal(table(tmp_path), table(undisturbed), check_exact=True)
 
 
 def test_rerun_of_what_is_not_there_is_one_line(tmp_path: Path) -> None:
@@ -187,14 +236,20 @@ def test_two_runs_in_one_folder_exclude_each_other(tmp_path: Path) -> None:
     assert not folder.database.exists()
 
 
-@pytest.mark.parametrize("policy", ["all", "failures", "none"])
-def test_traces_are_kept_by_policy(tmp_path: Path, policy: str) -> None:
+@pytest.mark.parametrize(
+    ("policy", "kept"), [("all", (True, True)), ("failures", (False, True)), ("none", (False,) * 2)]
+)
+def test_traces_are_kept_by_policy(
+    tmp_path: Path, policy: TracePolicy, kept: tuple[bool, bool]
+) -> None:
     """All of them, those of trials that did not end as `ok`, or none."""
-    study = msgspec.structs.replace(STUDY, cells=STUDY.cells[:1], scenarios=STUDY.scenarios[:1])
-    settings = RunSettings(jobs=1, traces=policy)  # type: ignore[arg-type]
-    run_study(study, tmp_path, settings, "a test")
-    kept = len(list((tmp_path / "traces").iterdir()))
-    assert kept == {"all": 2, "failures": 0, "none": 0}[policy]
+    failing = law_with(tmp_path, "gain: float = 1.0")
+    for formulation, expected in zip(("dls", failing), kept, strict=True):
+        trial = changed(formulation=formulation, scenario="reach[duration=0.1]")
+        row = run_trial(trial, tmp_path / "trace", policy)
+        assert (row["status"] == "ok") == (formulation == "dls")
+        assert (tmp_path / "trace").exists() == expected
+        (tmp_path / "trace").unlink(missing_ok=True)
 
 
 def test_a_store_of_another_schema_is_refused(undisturbed: Path, tmp_path: Path) -> None:
@@ -253,7 +308,8 @@ def test_times_are_kept_and_taken_anew_on_request(tmp_path: Path) -> None:
     study = msgspec.structs.replace(
         STUDY, scenarios=STUDY.scenarios[:1], timing=TimingSettings("dls", problems=10, rounds=3)
     )
-    run_study(study, tmp_path, RunSettings(jobs=1), "first")
+    run_study(study, tmp_path, RunSettings(jobs=1, traces="none"), "first")
+    assert list((tmp_path / "traces").iterdir()) == []
 
     def stamps() -> list[int]:
         with sqlite3.connect(tmp_path / "results.sqlite") as database:
@@ -270,40 +326,34 @@ def test_times_are_kept_and_taken_anew_on_request(tmp_path: Path) -> None:
         time_study(STUDY, tmp_path, "fourth")
 
 
-KILLED = """
-import sys
-from pathlib import Path
-from typing import Any
-from dikbench.run.runner import RunSettings, run_study
-sys.path.insert(0, {folder!r})
-from study_of_test import STUDY
-
-if __name__ == "__main__":
-    run_study(STUDY, Path({out!r}), RunSettings(jobs=2), "killed")
-"""
+def rows_in(store: Path) -> int:
+    """The number of trials that are committed in a store, which may not be there yet."""
+    try:
+        with sqlite3.connect(f"file:{store}?mode=ro", uri=True) as database:
+            return int(database.execute("SELECT COUNT(*) FROM trials").fetchone()[0])
+    except sqlite3.OperationalError:
+        return 0
 
 
 def test_a_killed_run_continues_to_the_same_rows(undisturbed: Path, tmp_path: Path) -> None:
-    """Driver and workers are killed three times; the rows are those of a run left alone.
+    """Driver and workers are killed twice; the rows are those of a run left alone.
 
     (`tests/faults/kill.py` does it as often as one likes.)
     """
-    script = tmp_path / "killed.py"
-    (tmp_path / "study_of_test.py").write_text(
-        "import msgspec\nfrom dikbench.study.study import Study\n"
-        f"STUDY = msgspec.convert({msgspec.to_builtins(STUDY)!r}, Study)\n"
-    )
-    script.write_text(KILLED.format(folder=str(tmp_path), out=str(tmp_path / "out")))
-    for seconds in (2.5, 4.0, 5.0):
+    command = script_of(STUDY, tmp_path, 2)
+    for rows in (1, 3):
         process = subprocess.Popen(
-            [sys.executable, str(script)],
+            command,
             start_new_session=True,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
-        time.sleep(seconds)
-        os.killpg(process.pid, signal.SIGKILL)
+        while process.poll() is None and rows_in(tmp_path / "out" / "results.sqlite") < rows:
+            time.sleep(0.01)
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
         process.wait()
+        assert rows_in(tmp_path / "out" / "results.sqlite") >= rows
     run_study(STUDY, tmp_path / "out", RunSettings(jobs=2), "continued")
     pd.testing.assert_frame_equal(table(tmp_path / "out"), table(undisturbed), check_exact=True)
     with sqlite3.connect(tmp_path / "out" / "results.sqlite") as database:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from makers.shared import made_once
 
 from dikbench.errors import DikbenchError
 from dikbench.metrics import METRICS
@@ -34,9 +35,11 @@ STUDY = Study(
 @pytest.fixture(scope="module")
 def fresh(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The results of the study, as the run left them."""
-    folder = tmp_path_factory.mktemp("fresh")
-    run_study(STUDY, folder, RunSettings(jobs=2), "a test")
-    return folder
+    return made_once(
+        tmp_path_factory,
+        "fresh",
+        lambda folder: run_study(STUDY, folder, RunSettings(jobs=2), "a test"),
+    )
 
 
 def copied(folder: Path, target: Path) -> Path:

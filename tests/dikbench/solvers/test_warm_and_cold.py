@@ -27,6 +27,13 @@ WHOLE_RUN = 100_000
 PAIRS = [("qp", name) for name in ("osqp", "clarabel", "piqp", "proxqp", "daqp", "highs")]
 PAIRS += [("lp-alpha", name) for name in ("osqp", "clarabel", "piqp", "daqp")]
 
+CASES = [
+    pytest.param(law, name, scenario, marks=() if (pair + number) % 3 == 0 else pytest.mark.long)
+    for pair, (law, name) in enumerate(PAIRS)
+    for number, scenario in enumerate(load_study("quick").scenarios)
+]
+"""Every pair on every scenario; the normal run has a third of them, in turns."""
+
 
 class _Kept:
     """A solve that keeps the last program and its answer."""
@@ -50,8 +57,7 @@ def _answer(law: str, problem: DikProblem, kept: _Kept) -> tuple[Array, float] |
     return problem.primary.J @ v, kept.cost
 
 
-@pytest.mark.parametrize("scenario", load_study("quick").scenarios)
-@pytest.mark.parametrize(("law", "name"), PAIRS)
+@pytest.mark.parametrize(("law", "name", "scenario"), CASES)
 def test_warm_and_cold_agree_under_the_finest_preset(law: str, name: str, scenario: str) -> None:
     """In task velocity (m/s, rad/s) and in cost; v itself is loose in the null space."""
     problems = record_problems(make_scenario(scenario), make_formulation("dls"), WHOLE_RUN)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from makers.shared import made_once
 
 from dikbench.run.runner import RunSettings, run_study
 from dikbench.study.study import Cells, Study
@@ -24,6 +25,8 @@ STUDY = Study(
 @pytest.fixture(scope="session")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder in which `dikbench run` has left `runs/viewed`."""
-    folder = tmp_path_factory.mktemp("viewer")
-    run_study(STUDY, folder / "runs" / "viewed", RunSettings(jobs=1), "a test")
-    return folder
+    return made_once(
+        tmp_path_factory,
+        "viewer",
+        lambda folder: run_study(STUDY, folder / "runs" / "viewed", RunSettings(jobs=1), "a test"),
+    )
