@@ -59,6 +59,7 @@ class JointLimitGraze(Family):
     speed: Annotated[float, Range(0.05, 0.9), Drawn(0.2, 0.8)] = 0.5
 
     variation = Variation(start=0.1, timing=0.1)
+    outruns_sampling = True
     about_position_limits = True
 
     def case(self, robot: Robot, change: Perturbation) -> Case:
