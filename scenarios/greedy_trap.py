@@ -53,6 +53,7 @@ class GreedyTrap(Family):
     goal: Annotated[float, Range(4.9, 6.0, "rad"), Drawn(5.1, 5.8)] = 5.5
 
     variation = Variation(start=0.2, direction=0.2)
+    judged = "end"
 
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """See `Family`."""

@@ -100,6 +100,7 @@ class HoldStill(Family):
     posture: Annotated[Literal["start", "singular", "limit"], Drawn()] = "start"
 
     variation = Variation(start=0.1)
+    tolerance_m = 0.001
 
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """See `Family`."""

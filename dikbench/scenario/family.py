@@ -26,6 +26,7 @@ from dikbench.scenario.oracle import POSE, OracleMotion, oracle_motion, position
 from dikbench.scenario.reference.reference import Reference
 from dikbench.scenario.scenario import Judged, Scenario, first_level
 from dikbench.scenario.situation import Situation, situation_of
+from dikbench.scenario.tolerance import sampling_floor, tolerance_above
 from dikbench.scenario.variation import NO_VARIATION, Perturbation, Variation
 from dikbench.scenario.witness import Feasible, Witness, beyond, followable, witness_of
 
@@ -95,6 +96,8 @@ class Family(Parameters, ABC):
         grid: the two parameters of a phase diagram, horizontal and vertical.
         about_position_limits: whether figures show the distance to the position limits.
         tolerance_m, judged, longest_path_run: see `Scenario`.
+        outruns_sampling: whether its speeds may take an exact formulation off the path in a control
+            period, so that the tolerance is raised (see `dikbench.scenario.tolerance`).
     """
 
     robot: str = "panda"
@@ -108,6 +111,7 @@ class Family(Parameters, ABC):
     grid: ClassVar[tuple[str, str] | None] = None
     about_position_limits: ClassVar[bool] = False
     tolerance_m: ClassVar[float] = 0.005
+    outruns_sampling: ClassVar[bool] = False
     judged: ClassVar[Judged] = "path"
     longest_path_run: ClassVar[float] = 5.0
 
@@ -177,6 +181,10 @@ class Family(Parameters, ABC):
             situation=situation,
         )
         made.certificate.check(type(self).__name__)
+        if self.outruns_sampling:
+            tolerance = tolerance_above(sampling_floor(made), self.tolerance_m)
+            if tolerance > self.tolerance_m:
+                made = replace(made, tolerance_m=tolerance)
         if made.feasible == "unknown" and (reason := infeasible_because(made)):
             return replace(made, feasible="no", infeasible_because=reason)
         return made
