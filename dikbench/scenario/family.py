@@ -7,11 +7,13 @@ from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, Final
 
 import numpy as np
+import pinocchio as pin
 
 from dikbench.arrays import Array
+from dikbench.errors import DikbenchError
 from dikbench.parameters import Parameters, Range, parameters_of
 from dikbench.problem.constraints import Constraint
-from dikbench.problem.tasks import PoseTask, Task, TrackingTask
+from dikbench.problem.tasks import PoseTask, Task, TrackingTask, TrackingTogether
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.robot import Robot
 from dikbench.scenario.building import (
@@ -137,6 +139,7 @@ class Family(Parameters, ABC):
         change = self.variation.drawn(seed)
         arm = limits_in_force(load_robot(self.robot, self.frame), acceleration=self.acceleration)
         case = self.case(arm, change)
+        _check_case(case)
         robot = arm if case.robot is None else case.robot
         tracking, tasks, v0 = case.tracking, case.tasks, case.v0
         if tracking is None:
@@ -234,6 +237,28 @@ def _lateness(motion: OracleMotion | None, witness: Witness | None) -> float:
     if motion is None:
         return 0.0
     return float((np.diff(motion.instants) * np.maximum(motion.speed_ratio - 1, 0.0)).sum())
+
+
+def _check_case(case: object) -> None:
+    """Check what a family's `case` returned, where a run would end in words of Python or NumPy."""
+    if not isinstance(case, Case):
+        raise DikbenchError(
+            f"case() returned {type(case).__name__}; valid: a dikbench.scenario.Case"
+        )
+    if isinstance(case.tracking, TrackingTogether):
+        raise DikbenchError(
+            "case() returned a TrackingTogether as `tracking`; valid: a task of the task frame "
+            "alone, such as PoseTask, and the others of its priority in `tasks`"
+        )
+    placement, twist = case.reference.placement(0.0), case.reference.velocity(0.0)
+    if not isinstance(placement, pin.SE3):
+        raise DikbenchError(
+            f"reference.placement(0) is of type {type(placement).__name__}; valid: pinocchio.SE3"
+        )
+    if np.shape(twist) != (6,):
+        raise DikbenchError(
+            f"reference.velocity(0) has the shape {np.shape(twist)}; valid: a body twist (6,)"
+        )
 
 
 def certified_robots(family: type[Family]) -> tuple[str, ...]:

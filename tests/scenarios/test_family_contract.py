@@ -117,8 +117,7 @@ class VariesInSecret(Honest):
 
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """See `Family`."""
-        case = super().case(robot, change)
-        return replace(case, q0=case.q0 + 1e-3 * change.seed)
+        return super().case(robot, Perturbation(Variation(start=1e-3), change.seed))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,8 +144,8 @@ class ThrowsDice(Honest):
 
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """See `Family`."""
-        case = super().case(robot, change)
-        return replace(case, q0=case.q0 + np.random.default_rng().uniform(-1e-3, 1e-3, 3))
+        thrown = int(np.random.default_rng().integers(1, 2**62))
+        return super().case(robot, Perturbation(Variation(start=1e-3), thrown))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -175,7 +174,7 @@ class Raises(Honest):
 
 
 MAKES_SCENARIOS = {
-    f"check_family_{c}" for c in ("certificate", "seeds", "deterministic", "picklable")
+    f"check_family_{c}" for c in ("certificate", "parts", "seeds", "deterministic", "picklable")
 }
 DICE = {"check_family_deterministic", "check_family_picklable"}
 LYING: list[tuple[Family, set[str]]] = [
@@ -185,7 +184,7 @@ LYING: list[tuple[Family, set[str]]] = [
     (ClaimsNothing(), {"check_family_certificate"}),
     (ClaimsTooMuch(), MAKES_SCENARIOS),
     (ChecksNothing(), {"check_family_certificate"}),
-    (StartsNowhere(), {"check_family_certificate"}),
+    (StartsNowhere(), {"check_family_parts"}),
     (VariesInSecret(), {"check_family_seeds"}),
     (StandsStill(), {"check_family_seeds"}),
     (TakesNegativeSeeds(), {"check_family_seeds"}),
