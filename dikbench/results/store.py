@@ -36,6 +36,8 @@ other versions are refused."""
 
 NUMBERS: Final = (*METRICS, *OUTCOME_NUMBERS, *SEES, "wall_time_s", "control_time_s")
 
+EMPTY_TEXT: Final = "TEXT NOT NULL DEFAULT ''"
+
 TABLES: Final = f"""
 CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL);
 CREATE TABLE runs (id INTEGER PRIMARY KEY, manifest TEXT NOT NULL);
@@ -45,7 +47,7 @@ CREATE TABLE trials (
   formulation TEXT NOT NULL, solver TEXT NOT NULL, scenario TEXT NOT NULL,
   plant TEXT NOT NULL, reference TEXT NOT NULL, seed INTEGER NOT NULL,
   status TEXT NOT NULL, message TEXT NOT NULL, steps INTEGER NOT NULL,
-  {", ".join(f"{name} TEXT" for name in OUTCOME_TEXTS)},
+  {", ".join(f"{name} {EMPTY_TEXT}" for name in OUTCOME_TEXTS)},
   {", ".join(f"{name} REAL" for name in NUMBERS)},
   environment TEXT REFERENCES environments (id),
   run INTEGER NOT NULL REFERENCES runs (id),
@@ -197,7 +199,7 @@ class Store:
     def record_trial(self, row: Mapping[str, Any], run: int, position: int) -> None:
         """Commit the row of a finished trial, replacing an earlier one."""
         columns = ("id", *KEYS, "steps", *OUTCOME_TEXTS, *NUMBERS, "environment")
-        values = {name: row.get(name) for name in columns}
+        values = {name: row.get(name, "" if name in OUTCOME_TEXTS else None) for name in columns}
         self._insert("trials", {**values, "run": run, "position": position})
 
     def record_metrics(self, trial: str, metrics: Mapping[str, Any]) -> None:
@@ -333,7 +335,7 @@ class Store:
         if found["schema"] != str(SCHEMA_VERSION):
             self._migrate(columns, times=found["schema"] == "1")
         for name in missing:
-            kind = "TEXT" if name in OUTCOME_TEXTS else "REAL"
+            kind = EMPTY_TEXT if name in OUTCOME_TEXTS else "REAL"
             self._database.execute(f"ALTER TABLE trials ADD COLUMN {name} {kind}")
 
     def _migrate(self, columns: Sequence[str], *, times: bool) -> None:
