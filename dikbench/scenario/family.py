@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import pinocchio as pin
@@ -95,6 +95,25 @@ class Family(Parameters, ABC):
     grid: ClassVar[tuple[str, str] | None] = None
     about_position_limits: ClassVar[bool] = False
 
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Refuse class variables of another kind than figures, checks and seeds need.
+
+        Raises:
+            DikbenchError: if there is one.
+        """
+        super().__init_subclass__(**options)
+        wanted: dict[str, tuple[bool, str]] = {
+            "variation": (isinstance(cls.variation, Variation), "Variation(start=0.1)"),
+            "robots": (_names(cls.robots), '("panda", "ur5")'),
+            "grid": (cls.grid is None or (_names(cls.grid) and len(cls.grid) == 2), '("x", "y")'),
+        }
+        for name, (fits, example) in wanted.items():
+            if not fits:
+                raise DikbenchError(
+                    f"class {cls.__qualname__}: {name} = {getattr(cls, name)!r} is not valid; "
+                    f"valid: such as {name} = {example}"
+                )
+
     @abstractmethod
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """Make the family's part of a scenario.
@@ -158,6 +177,10 @@ class Family(Parameters, ABC):
         """
         instants = samples(reference.duration, self.dt, most)
         return oracle_motion(robot, reference, q0, instants, tracking)
+
+
+def _names(value: object) -> bool:
+    return isinstance(value, tuple) and all(isinstance(name, str) for name in value)
 
 
 def _check_case(case: object) -> None:
