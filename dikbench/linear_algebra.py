@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 from scipy.linalg.lapack import dgeqrf, dgesdd, dposv
+from scipy.optimize import nnls
 
 from dikbench.arrays import Array
 
@@ -16,9 +17,25 @@ SMALLEST_PIVOT_RATIO = 1e-4
 """A Gram matrix whose smallest pivot is a smaller share of its largest is ill-conditioned."""
 
 
+NO_ROW = 1e-12
+"""Length up to which the row of an inequality bounds nothing."""
+
+INCONSISTENT = 1e-8
+"""Inequalities of rows of about unit length that can only be met to more than this contradict each
+other."""
+
+
 def thin_svd(A: Array) -> tuple[Array, Array, Array]:
     """Compute U (m, k), falling singular values (k,) and V^T (k, n) of A (m, n), k = min(m, n)."""
-    U, singular, Vt, _ = dgesdd(A, full_matrices=0)
+    return _svd(A, 0)
+
+
+def _svd(A: Array, full: int) -> tuple[Array, Array, Array]:
+    """Decompose A by LAPACK; NaN where there is no decomposition, as of a matrix with NaN."""
+    U, singular, Vt, failed = dgesdd(A, full_matrices=full)
+    if failed:  # LAPACK leaves zeros behind, which would pass for an answer
+        for part in (U, singular, Vt):
+            part.fill(np.nan)
     return U, singular, Vt
 
 
@@ -86,8 +103,8 @@ def null_space(A: Array, tolerance: float) -> Array:
 
     Singular values up to `tolerance` (absolute, in the units of A) count as zero.
     """
-    _, singular, Vt, _ = dgesdd(A, full_matrices=1)
-    basis: Array = Vt[int(np.count_nonzero(singular > tolerance)) :].T
+    _, singular, Vt = _svd(A, 1)
+    basis: Array = Vt[rank(singular, tolerance) :].T
     return basis
 
 
@@ -101,7 +118,7 @@ class DampedInverse:
     __slots__ = ("_U", "_Vt", "_damped", "_kept", "_singular")
 
     def __init__(self, A: Array, tolerance: float, damping: float) -> None:
-        self._U, self._singular, self._Vt, _ = dgesdd(A, full_matrices=0)
+        self._U, self._singular, self._Vt = _svd(A, 0)
         self._kept = self._singular > tolerance
         self._damped = self._singular**2 + damping**2
 
@@ -136,10 +153,10 @@ def inverse_and_row_space(A: Array, tolerance: float, damping: float = 0.0) -> t
     The r singular values s above the (absolute) tolerance have the inverse s / (s^2 + damping^2),
     the others count as zero. I - basis^T basis projects onto the null space of A.
     """
-    U, singular, Vt, _ = dgesdd(A, full_matrices=0)
-    rank = int((singular > tolerance).sum())
-    kept, basis = singular[:rank], Vt[:rank]
-    inverse: Array = (basis.T * (kept / (kept * kept + damping * damping))) @ U[:, :rank].T
+    U, singular, Vt = _svd(A, 0)
+    k = rank(singular, tolerance)
+    kept, basis = singular[:k], Vt[:k]
+    inverse: Array = (basis.T * (kept / (kept * kept + damping * damping))) @ U[:, :k].T
     return inverse, basis
 
 
@@ -153,3 +170,29 @@ def volume(A: Array) -> float:
         return 0.0
     R, _, _, _ = dgeqrf(A.T)
     return float(abs(R.diagonal().prod()))
+
+
+def shortest(G: Array, h: Array) -> Array | None:
+    """The shortest x (n,) with G x <= h, for G (p, n), h (p,); None where there is none.
+
+    With the rows scaled to unit length, u >= 0 the least-squares solution of
+    [-G^T; -h^T] u = (0, ..., 0, 1) and r what is left of it, x_j = -r_j / r_(n+1); r = 0 where no x
+    does it.
+
+    Source: Lawson & Hanson (1974), Solving Least Squares Problems, chapter 23.
+    """
+    n, size = G.shape[1], np.linalg.norm(G, axis=1)
+    rows = size > NO_ROW
+    if not rows.any():  # which scipy's solver does not survive
+        return np.zeros(n) if h.min(initial=0.0) >= -INCONSISTENT else None
+    E, f = -np.vstack([G[rows].T, h[rows]]) / size[rows], np.zeros(n + 1)
+    f[n] = 1.0
+    try:
+        u, _ = nnls(E, f)
+    except RuntimeError:  # it counts its iterations
+        return None
+    left = E @ u - f
+    if -left[n] < INCONSISTENT:
+        return None
+    x: Array = -left[:n] / left[n]
+    return x if (G @ x - h).max(initial=0.0) <= INCONSISTENT else None

@@ -13,6 +13,7 @@ from dikbench.problem import (
     DikProblem,
     LimitKind,
     Parameters,
+    ProblemPart,
     ProgramKind,
     QuadraticProgram,
     Range,
@@ -53,6 +54,7 @@ class AlphaTwoStage(Parameters):
     keeps: ClassVar[frozenset[LimitKind]] = frozenset(
         {"position", "velocity", "acceleration", "inequalities"}
     )
+    sees: ClassVar[frozenset[ProblemPart]] = frozenset({"postures"})
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

@@ -13,6 +13,7 @@ from dikbench.problem import (
     Drawn,
     LimitKind,
     Parameters,
+    ProblemPart,
     ProgramKind,
     QuadraticProgram,
     Range,
@@ -46,6 +47,7 @@ class DisplacementQp(Parameters):
 
     program: ClassVar[ProgramKind] = "qp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
+    sees: ClassVar[frozenset[ProblemPart]] = frozenset({"lower-tasks"})
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

@@ -14,6 +14,7 @@ from dikbench.problem import (
     LimitKind,
     LinearizedJointTask,
     Parameters,
+    ProblemPart,
     ProgramKind,
     QuadraticProgram,
     Range,
@@ -51,6 +52,11 @@ class Drake(Parameters):
 
     program: ClassVar[ProgramKind] = "lp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
+
+    @property
+    def sees(self) -> frozenset[ProblemPart]:
+        """The posture, where joints are drawn to one."""
+        return frozenset({"postures"}) if self.centering else frozenset()
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

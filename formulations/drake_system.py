@@ -15,6 +15,7 @@ from dikbench.problem import (
     LimitKind,
     Limits,
     Parameters,
+    ProblemPart,
     ProgramKind,
     QuadraticProgram,
     Range,
@@ -58,6 +59,11 @@ class DrakeSystem(Parameters):
 
     program: ClassVar[ProgramKind] = "qp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"velocity"})
+
+    @property
+    def sees(self) -> frozenset[ProblemPart]:
+        """The posture, where joints are drawn to one."""
+        return frozenset({"postures"}) if self.centering else frozenset()
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

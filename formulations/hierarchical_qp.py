@@ -16,6 +16,7 @@ from dikbench.problem import (
     Drawn,
     LimitKind,
     Parameters,
+    ProblemPart,
     ProgramKind,
     QuadraticProgram,
     Range,
@@ -66,6 +67,7 @@ class HierarchicalQp(Parameters):
     keeps: ClassVar[frozenset[LimitKind]] = frozenset(
         {"position", "velocity", "acceleration", "inequalities"}
     )
+    sees: ClassVar[frozenset[ProblemPart]] = frozenset({"lower-tasks"})
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

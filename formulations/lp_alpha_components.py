@@ -16,7 +16,6 @@ from dikbench.problem import (
     Drawn,
     LimitKind,
     LinearizedOrientation,
-    LinearizedTask,
     Parameters,
     ProgramKind,
     QuadraticProgram,
@@ -59,13 +58,21 @@ class LpAlphaComponents(Parameters):
     program: ClassVar[ProgramKind] = "lp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
 
+    def refuses(self, problem: DikProblem) -> str:
+        """Whether the first priority is anything but one pose, or a part of one."""
+        try:
+            _rows(problem, problem.robot.task_rows)
+        except Infeasible as error:
+            return str(error)
+        return ""
+
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
         task, robot = problem.primary, problem.robot
         m, n = task.J.shape
         pin.forwardKinematics(robot.model, robot.scratch, problem.q)
         rotation = pin.updateFramePlacement(robot.model, robot.scratch, robot.frame_id).rotation
-        rows = _rows(task, robot.task_rows)
+        rows = _rows(problem, robot.task_rows)
         rates = twist_from_rates(rotation) if rows[-1] >= 3 else rotation.T
         E = rates[np.ix_(rows, rows)]
         P = np.zeros((n + m, n + m))
@@ -78,12 +85,19 @@ class LpAlphaComponents(Parameters):
         return solve(QuadraticProgram(P, q, A=A, b=np.zeros(m), lb=lower, ub=upper))[:n]
 
 
-def _rows(task: LinearizedTask, rows: tuple[int, ...]) -> list[int]:
-    """Return the twist's rows of a task: a whole pose, a position or an orientation."""
-    turns = isinstance(task, LinearizedOrientation)
+def _rows(problem: DikProblem, rows: tuple[int, ...]) -> list[int]:
+    """Return the rows of the twist that the first priority is about.
+
+    Those of a whole pose, a position or an orientation.
+
+    Raises:
+        Infeasible: if it is about anything else.
+    """
+    first = [task for task in problem.tasks if task.priority == problem.tasks[0].priority]
+    turns = isinstance(first[0], LinearizedOrientation)
     part = [row for row in rows if (row >= 3) == turns]
     for kept in (list(rows), part):
-        if len(kept) == len(task.V):
+        if len(first) == 1 and len(kept) == len(first[0].V):
             return kept
     raise Infeasible("components are those of a pose or a part of it, not of several tasks")
 

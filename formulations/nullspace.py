@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from dikbench.problem import (
     DikProblem,
     Drawn,
     Parameters,
+    ProblemPart,
     Projector,
     Range,
     Solve,
@@ -47,6 +48,8 @@ class Nullspace(Parameters):
     damping: Annotated[float, Range(0.0), Drawn(1e-3, 0.3, log=True)] = 0.0
     projector: Projector = "exact"
     rank_tolerance: Annotated[float, Range(0.0)] = 1e-6
+
+    sees: ClassVar[frozenset[ProblemPart]] = frozenset({"lower-tasks"})
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

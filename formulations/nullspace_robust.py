@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from dikbench.problem import (
     Array,
@@ -11,6 +11,7 @@ from dikbench.problem import (
     DikProblem,
     Drawn,
     Parameters,
+    ProblemPart,
     Projector,
     Range,
     Solve,
@@ -43,6 +44,8 @@ class NullspaceRobust(Parameters):
     damping: Annotated[float, Range(0.0), Drawn(1e-3, 0.3, log=True)] = 0.0
     projector: Projector = "exact"
     rank_tolerance: Annotated[float, Range(0.0)] = 1e-6
+
+    sees: ClassVar[frozenset[ProblemPart]] = frozenset({"lower-tasks"})
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

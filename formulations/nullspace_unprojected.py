@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 
-from dikbench.problem import Array, DikProblem, Parameters, Range, Solve, pseudo_inverse
+from dikbench.problem import (
+    Array,
+    DikProblem,
+    Parameters,
+    ProblemPart,
+    Range,
+    Solve,
+    pseudo_inverse,
+)
 
 
 @dataclass(frozen=True)
@@ -30,6 +38,8 @@ class NullspaceUnprojected(Parameters):
     """
 
     rank_tolerance: Annotated[float, Range(0.0)] = 1e-6
+
+    sees: ClassVar[frozenset[ProblemPart]] = frozenset({"lower-tasks"})
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

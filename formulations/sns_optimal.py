@@ -5,7 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
-from dikbench.problem import Array, Braking, DikProblem, LimitKind, Parameters, Range, Solve
+from dikbench.problem import (
+    Array,
+    Braking,
+    DikProblem,
+    LimitKind,
+    Parameters,
+    ProblemPart,
+    Range,
+    Solve,
+)
 from formulations.saturation import saturated_levels
 
 
@@ -37,6 +46,7 @@ class OptimalSaturationInNullSpace(Parameters):
     rank_tolerance: Annotated[float, Range(0.0)] = 1e-6
 
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
+    sees: ClassVar[frozenset[ProblemPart]] = frozenset({"lower-tasks"})
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

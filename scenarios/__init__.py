@@ -17,6 +17,8 @@ from scenarios.hold_still import HoldStill
 from scenarios.humanoid import Humanoid
 from scenarios.joint_limit_approach import JointLimitApproach
 from scenarios.joint_limit_crossing import JointLimitCrossing
+from scenarios.joint_limit_detour import JointLimitDetour
+from scenarios.joint_limit_graze import JointLimitGraze
 from scenarios.log_derivative_drift import LogDerivativeDrift
 from scenarios.near_miss import NearMiss
 from scenarios.obstacle import ObstacleInTheWay
@@ -38,6 +40,8 @@ SCENARIOS: Mapping[str, type[Family]] = MappingProxyType(
         "near-miss": NearMiss,
         "joint-limit-crossing": JointLimitCrossing,
         "joint-limit-approach": JointLimitApproach,
+        "joint-limit-graze": JointLimitGraze,
+        "joint-limit-detour": JointLimitDetour,
         "start-outside": StartOutside,
         "greedy-trap": GreedyTrap,
         "task-conflict": TaskConflict,

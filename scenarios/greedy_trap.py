@@ -53,6 +53,7 @@ class GreedyTrap(Family):
     goal: Annotated[float, Range(4.9, 6.0, "rad"), Drawn(5.1, 5.8)] = 5.5
 
     variation = Variation(start=0.2, direction=0.2)
+    judged = "end"
 
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """See `Family`."""
@@ -78,4 +79,11 @@ class GreedyTrap(Family):
             Claim("error at the end of the way round (m, rad)", missed, at_most=1e-9),
             Claim("its required speed over limit", motion.peak_speed_ratio, at_most=0.9),
         )
-        return Case(target_at_rest(target, duration), q0, motion, claims, v0=np.zeros(1))
+        return Case(
+            target_at_rest(target, duration),
+            q0,
+            motion,
+            claims,
+            v0=np.zeros(1),
+            situation="at joint limits",
+        )

@@ -17,6 +17,7 @@ from dikbench.scenario import (
     Claim,
     Family,
     Perturbation,
+    Situation,
     Variation,
     joint_oracle,
     placement_of,
@@ -58,6 +59,11 @@ POSTURES: Mapping[str, Postures] = MappingProxyType(
     }
 )
 
+SITUATIONS: Mapping[str, Situation] = MappingProxyType(
+    {"start": "free space", "singular": "near singularities", "limit": "at joint limits"}
+)
+"""What is difficult about a posture."""
+
 RANGES: Mapping[str, tuple[tuple[float, float], tuple[float, float]]] = MappingProxyType(
     {
         "start": ((0.08, inf), (0.3, inf)),
@@ -80,7 +86,7 @@ class HoldStill(Family):
 
     Provokes: drift and chatter, given a plant with noise or delay
 
-    Shows in: velocity_peak_ratio, joint_travel_rad, off_course_max_rad
+    Shows in: velocity_peak_ratio, joint_travel_rad, direction_error_max_rad
 
     Attributes:
         robot: one of these robots.
@@ -94,6 +100,7 @@ class HoldStill(Family):
     posture: Annotated[Literal["start", "singular", "limit"], Drawn()] = "start"
 
     variation = Variation(start=0.1)
+    tolerance_m = 0.001
 
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """See `Family`."""
@@ -105,7 +112,8 @@ class HoldStill(Family):
             Claim("position margin [rad]", motion.margin.min(), *margin),
         )
         reference = target_at_rest(placement_of(robot, q0), DURATION_S)
-        return Case(reference, q0, motion, claims, v0=np.zeros(robot.nv))
+        situation = SITUATIONS[self.posture]
+        return Case(reference, q0, motion, claims, v0=np.zeros(robot.nv), situation=situation)
 
     def _posture(self, robot: Robot, change: Perturbation) -> Array:
         where = POSTURES[self.robot]

@@ -84,6 +84,7 @@ class Humanoid(Family):
     laps: Annotated[float, Range(1.0, 5.0)] = 2.0
 
     variation = Variation(start=0.1, direction=0.2)
+    outruns_sampling = True
 
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """See `Family`."""

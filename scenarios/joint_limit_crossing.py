@@ -68,7 +68,7 @@ class JointLimitCrossing(Family):
 
     Provokes: a path that leads out of a joint's range
 
-    Shows in: position_violation_max_rad, off_course_max_rad
+    Shows in: position_violation_max_rad, direction_error_max_rad
 
     Attributes:
         robot: one of these robots.

@@ -13,6 +13,7 @@ import pinocchio as pin
 from dikbench.errors import DikbenchError
 from dikbench.problem import Array, Drawn, Range, Robot
 from dikbench.scenario import (
+    SINGULAR_NEED,
     Case,
     Certificate,
     Claim,
@@ -78,7 +79,7 @@ class NearMiss(Family):
 
     Provokes: joint speeds beyond the limits near a singularity
 
-    Shows in: velocity_peak_ratio, off_course_max_rad, progress_min
+    Shows in: velocity_peak_ratio, direction_error_max_rad, progress_min
 
     Attributes:
         singularity: wrist, elbow or shoulder, where the robot's are known; auto: the first known
@@ -116,7 +117,16 @@ class NearMiss(Family):
             seeded = pin.integrate(robot.model, pin.neutral(robot.model), np.array(known.posture))
             where = _perturbed(robot, make_singular(robot, seeded), change)
             passage = _passage(robot, where, self.miss, pace, known.half_length)
-        return Case(passage.reference, passage.motion.q[0], passage.motion, passage.claims)
+        motion = passage.motion
+        # At a fold the smallest singular value is about the root of the distance.
+        singular = motion.peak_speed_ratio > SINGULAR_NEED
+        return Case(
+            passage.reference,
+            motion.q[0],
+            motion,
+            passage.claims,
+            situation="near singularities" if singular else None,
+        )
 
 
 def _known(robot: str, singularity: SingularityName | Literal["auto"]) -> SingularPosture:

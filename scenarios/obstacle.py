@@ -138,6 +138,7 @@ class ObstacleInTheWay(Family):
         )
         distance, depth = constraint.distances(robot, motion.q), 0.8 * self.depth
         claims = collision_claims(motion, distance, MARGIN_M, depth=depth, speed=self.speed)
+        other = None
         if self.where == "hand":
             carried = _distance_of_hand(robot, half_way, constraint)
             claims += (Claim("distance of the hand on its path [m]", carried, -0.1, -depth),)
@@ -151,7 +152,7 @@ class ObstacleInTheWay(Family):
                 Claim("position margin of that motion [rad]", margin, at_least=0.05),
                 Claim("required speed of that motion over limit", fastest, at_most=1.0),
             )
-        return Case(reference, q0, motion, claims, constraints=(constraint,))
+        return Case(reference, q0, motion, claims, constraints=(constraint,), witness=other)
 
 
 def _swing(arm: Robot, middle: Array, swing: Swing, duration: float) -> tuple[Array, Reference]:

@@ -56,6 +56,7 @@ class PickAndPlace(Family):
 
     robots = ("panda", "ur3", "ur5", "ur10", "xarm7", "kinova", "tiago")
     variation = Variation(start=0.05, direction=0.2)
+    outruns_sampling = True
 
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """See `Family`."""

@@ -16,6 +16,7 @@ from dikbench.scenario import (
     Perturbation,
     Time,
     Variation,
+    from_rest_to_rest,
     motion_of_a_step,
     placement_of,
     step_claims,
@@ -64,4 +65,5 @@ class Reach(Family):
         target = placement_of(robot, q0) * pin.exp6(pin.Motion(twist))
         way = motion_of_a_step(robot, q0, twist, self.gain)
         claims = (*step_claims(way), *usual_claims(way, speed=(-np.inf, 0.9)))
-        return Case(target_at_rest(target, self.duration), q0, None, claims)
+        witness = from_rest_to_rest(robot, way, 0.8 * self.duration)
+        return Case(target_at_rest(target, self.duration), q0, None, claims, witness=witness)

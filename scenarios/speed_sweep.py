@@ -61,6 +61,7 @@ class SpeedSweep(Family):
 
     robots = ("panda", "ur5", "ur10", "xarm7", "kinova", "tiago", "talos")
     variation = Variation(start=0.1, direction=0.2)
+    outruns_sampling = True
 
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """See `Family`."""

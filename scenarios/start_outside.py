@@ -74,6 +74,7 @@ class StartOutside(Family):
     duration: Time = 2.0
 
     variation = Variation(start=0.05, timing=0.1)
+    tolerance_m = 0.002
     about_position_limits = True
 
     def case(self, robot: Robot, change: Perturbation) -> Case:

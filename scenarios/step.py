@@ -18,6 +18,7 @@ from dikbench.scenario import (
     Perturbation,
     Time,
     Variation,
+    from_rest_to_rest,
     motion_of_a_step,
     placement_of,
     step_claims,
@@ -54,7 +55,7 @@ class Step(Family):
 
     Provokes: an error that requires joint speeds beyond the limits at once
 
-    Shows in: off_course_max_rad, velocity_violation_max_rad_s, progress_min
+    Shows in: direction_error_max_rad, velocity_violation_max_rad_s, progress_min
 
     Attributes:
         robot: one of the arms in space.
@@ -86,4 +87,5 @@ class Step(Family):
         way = motion_of_a_step(robot, q0, pin.log6(start.actInv(target)).np, self.gain)
         least = SMALLEST_FIRST_SPEED * self.gain * self.angle
         claims = (*step_claims(way), Claim("first speed over limit", way.speed_ratio[0], least))
-        return Case(target_at_rest(target, self.duration), q0, None, claims)
+        witness = from_rest_to_rest(robot, way, 0.8 * self.duration)
+        return Case(target_at_rest(target, self.duration), q0, None, claims, witness=witness)

@@ -109,6 +109,7 @@ class TaskConflict(Family):
     second_gain: Gain = 2.0
 
     variation = Variation(start=0.05, timing=0.1)
+    outruns_sampling = True
 
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """See `Family`."""

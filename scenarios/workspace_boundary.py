@@ -80,11 +80,14 @@ class WorkspaceBoundary(Family):
         motion = _as_far_as_it_goes(robot, at, first, q0)
         reach = float(motion.reach[-1])
         farthest = self.extent * reach
+        length = farthest - first
         if self.path == "still":
-            reference = target_at_rest(at(farthest), 20 / self.gain)
+            reference, until = target_at_rest(at(farthest), 20 / self.gain), 0.0
         else:
             along = start.rotation.T @ ray
-            reference = _out_and_back(at, along, first, farthest - first, self.speed)
+            reference = _out_and_back(at, along, first, length, self.speed)
+            share = min(1.0, max(0.0, (reach - first) / length))
+            until = reference.duration / pi * float(np.arcsin(np.sqrt(share)))
         asked = robot.reach_of(reference.placement(reference.duration / 2))
         sigma = motion.sigma_min
         claims = (
@@ -94,7 +97,15 @@ class WorkspaceBoundary(Family):
             Claim("its ratio to the one at the start", sigma[-1] / sigma[0], at_most=0.1),
             Claim("position margin up to there [rad]", motion.margin.min(), at_least=0.02),
         )
-        return Case(reference, q0, None, claims)
+        return Case(
+            reference,
+            q0,
+            None,
+            claims,
+            followable_until=until,
+            comes_back=reference.moving,
+            situation="near singularities" if reference.moving else "steps",
+        )
 
 
 def _as_far_as_it_goes(

@@ -3,26 +3,91 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
 
 import click
 
 from dikbench.cli.one_line_errors import one_line_errors
 
+MOST_PLACES: Final = 5
+"""At most so many places are named where a study breaks an invariant."""
+
+Line = tuple[str, str, str]
+"""What came of a check, what was checked, and why it is broken."""
+
 
 @click.command()
-@click.argument("name", metavar="SELECTOR")
+@click.argument("name", metavar="SELECTOR", required=False)
 @click.option(
     "--solver",
     metavar="SELECTOR",
     help="The solver with which a formulation is checked; default: that of its program.",
 )
+@click.option(
+    "--benchmark",
+    metavar="STUDY",
+    help="Run a study together with straw laws, and check that it keeps all invariants.",
+)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="DIR",
+    help="Results folder of the study; default: runs/check-STUDY.",
+)
+@click.option(
+    "--jobs",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Worker processes of the study; default: one per core.",
+)
 @one_line_errors
-def check(name: str, solver: str | None) -> None:
+def check(
+    name: str | None, solver: str | None, benchmark: str | None, out: Path | None, jobs: int | None
+) -> None:
     """Print which promises a formulation or a scenario family keeps, a line for each check.
 
     SELECTOR is a name with parameters where wanted, or 'path/to/file.py:Class[...]'. The exit code
     is 1 where a promise is broken.
+
+    With --benchmark it is a study that is checked: straw laws, which stand still, creep, shake or
+    ignore all limits, must win nothing in it, and a known joint motion must succeed.
     """
+    if (name is None) == (benchmark is None):
+        raise click.UsageError("give a SELECTOR, or --benchmark STUDY")
+    lines = _of_plugin(name, solver) if name else _of_study(str(benchmark), out, jobs)
+    broken = False
+    for outcome, what, reason in lines:
+        click.echo(f"{outcome:<12}  {what}{f': {reason}' if reason else ''}")
+        broken |= outcome == "BROKEN"
+    sys.exit(1 if broken else 0)
+
+
+def _of_study(benchmark: str, out: Path | None, jobs: int | None) -> Iterator[Line]:
+    """Run a study with straw laws, and yield a line for each invariant."""
+    import shlex
+
+    from dikbench.invariants import check_benchmark
+    from dikbench.run.pool import available_cores
+    from dikbench.run.runner import RunSettings
+    from dikbench.study.study import load_study
+
+    study = load_study(benchmark)
+    folder = out or Path("runs") / f"check-{study.name}"
+    settings = RunSettings(jobs=jobs or available_cores(), traces="none")
+    command = shlex.join(["dikbench", *sys.argv[1:]])
+    for checked in check_benchmark(study, folder, settings, command):
+        if not checked.broken:
+            yield "kept", checked.sentence, ""
+        for place in checked.broken[:MOST_PLACES]:
+            yield "BROKEN", checked.sentence, place
+        if len(checked.broken) > MOST_PLACES:
+            yield "BROKEN", checked.sentence, f"and {len(checked.broken) - MOST_PLACES} more"
+
+
+def _of_plugin(name: str, solver: str | None) -> Iterator[Line]:
+    """Yield a line for each check of a plug-in's contract."""
     from dikbench.errors import DikbenchError, unknown
     from dikbench.plugins.building import make_family, make_formulation
     from dikbench.plugins.finding import in_file, kind_in_file, plugins
@@ -42,9 +107,5 @@ def check(name: str, solver: str | None) -> None:
         raise DikbenchError(f"--solver {solver}: {name} is a scenario family, which needs none")
     else:
         verdicts = verdicts_on_family(make_family(name))
-    broken = False
     for verdict in verdicts:
-        reason = f": {verdict.reason}" if verdict.reason else ""
-        click.echo(f"{verdict.outcome:<12}  {verdict.check}{reason}")
-        broken |= verdict.outcome == "BROKEN"
-    sys.exit(1 if broken else 0)
+        yield verdict.outcome, verdict.check, verdict.reason

@@ -5,6 +5,8 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
+from typing import Final
 
 import numpy as np
 
@@ -21,12 +23,25 @@ from dikbench.plugins.finding import (
 )
 from dikbench.report.tables.kinds import kinds_with
 from dikbench.robots.catalogue import ROBOTS, load_robot
-from dikbench.scenario.oracle import ORACLE
+from dikbench.scenario.oracle import ORACLE, ORACLES, SLOWED_ORACLE
 from dikbench.scenario.plant import PLANTS
+from dikbench.scenario.scenario import Scenario
 from dikbench.selector import Selector, listed, parse_selector
-from dikbench.solvers.catalogue.back_ends import BACK_ENDS, is_installed, parse_solver
+from dikbench.solvers.catalogue.back_ends import (
+    BACK_ENDS,
+    DEFAULT_SOLVER,
+    is_installed,
+    parse_solver,
+)
 from dikbench.solvers.catalogue.presets import TOLERANCES
 from dikbench.study.study import load_study, shipped_studies
+
+ORACLE_SUMMARIES: Final = MappingProxyType(
+    {
+        ORACLE: "Not a formulation: the exact joint motion of a scenario, scored like one",
+        SLOWED_ORACLE: "Not a formulation: a joint motion slowed down until it keeps all limits",
+    }
+)
 
 
 def listing(subject: str) -> list[str]:
@@ -49,13 +64,12 @@ def _bracketed(source: str) -> str:
 
 def _formulations() -> list[tuple[str, str, str]]:
     formulations = plugins("formulation").values()
-    summary = "Not a formulation: the exact joint motion of a scenario, scored like one"
     return [
         *(
             (formulation.name, formulation.summary.rstrip("."), formulation.source)
             for formulation in formulations
         ),
-        (ORACLE, summary, ""),
+        *((name, summary, "") for name, summary in ORACLE_SUMMARIES.items()),
     ]
 
 
@@ -123,8 +137,8 @@ def description(text: str) -> str:
 
 
 def _without_parameters(name: str) -> str:
-    if name == ORACLE:
-        return f"{ORACLE}: {_formulations()[-1][1]}"
+    if name in ORACLES:
+        return f"{name}: {ORACLE_SUMMARIES[name]}"
     if name in ROBOTS:
         return _robot(name)
     if name in METRICS:
@@ -193,7 +207,29 @@ def _difficulty(text: str) -> list[str]:
             f"  required speed over limit: up to {motion.peak_speed_ratio:.4g}",
             f"  reach from the first joint [m]: {reach.min():.4g} to {reach.max():.4g}",
         ]
-    return [*lines, "", f"A seed perturbs: {scenario.variation}."]
+    return [*lines, "", *_verdict(scenario), "", f"A seed perturbs: {scenario.variation}."]
+
+
+def _verdict(scenario: Scenario) -> list[str]:
+    """Describe by what a scenario's trials are judged, and what can be done of it."""
+    witness, until = scenario.witness, scenario.followable_until
+    late = 0.0 if witness is None else witness.lateness
+    known = {
+        "time": "a motion is known that keeps all limits by the clock",
+        "path": f"a motion is known that keeps all limits if the path may wait, {late:.3g} s late",
+        "no": scenario.infeasible_because,
+        "unknown": "neither a motion is known nor a proof that there is none",
+    }[scenario.feasible]
+    end = "its end can be reached" if scenario.comes_back else "its end cannot be reached"
+    return [
+        "How its trials are judged:",
+        f"  situation: {scenario.situation}",
+        f"  judged by: {'the whole path' if scenario.judged == 'path' else 'where it ends'}",
+        f"  tolerance [m]: {scenario.tolerance_m:g}",
+        f"  feasible: {known}",
+        f"  need (joint speed of the exact motion over its limit): {scenario.need:.4g}",
+        "  can be followed until: " + ("its end" if until is None else f"{until:.4g} s; {end}"),
+    ]
 
 
 def _solver(selector: Selector) -> str:
@@ -210,6 +246,12 @@ def _solver(selector: Selector) -> str:
             f"  linear programs: {entry.no_lp or 'yes'}",
             f"  presets: {presets} (largest residual of a verified answer)",
             f"  settings: {settings or 'none'}",
+            f"  then: another solver, asked where {name} gives no answer, as in {name}[then=...]",
+            *(
+                f"  the default of formulations with a program of kind {program}: {default}"
+                for program, default in DEFAULT_SOLVER.items()
+                if parse_selector(default).name == name
+            ),
             *([f"  selected: {listed(selector.parameters)}"] if selector.parameters else []),
         ]
     )

@@ -7,19 +7,34 @@ A metric is a pure function of the recorded motion. Most are reductions of a ser
 from __future__ import annotations
 
 from dikbench.metrics.every import METRICS, evaluate
+from dikbench.metrics.judging import judge, outcome_columns
 from dikbench.metrics.metric import Metric, series_metrics
 from dikbench.metrics.motion import Motion
 from dikbench.metrics.motion_of_trace import motion_of
+from dikbench.metrics.outcome import (
+    OUTCOME_NUMBERS,
+    OUTCOME_TEXTS,
+    Judgement,
+    Outcome,
+    Verdict,
+)
 from dikbench.metrics.reductions import REDUCTIONS
 from dikbench.metrics.violation import VIOLATION_TOLERANCE
 
 __all__ = [
     "METRICS",
+    "OUTCOME_NUMBERS",
+    "OUTCOME_TEXTS",
     "REDUCTIONS",
     "VIOLATION_TOLERANCE",
+    "Judgement",
     "Metric",
     "Motion",
+    "Outcome",
+    "Verdict",
     "evaluate",
+    "judge",
     "motion_of",
+    "outcome_columns",
     "series_metrics",
 ]

@@ -1,91 +1,131 @@
-"""The position of a frame along a path: the nearest point, without jumps to other laps."""
+"""The course of a motion along its path: its coverage, its lag and the tolerances it needs."""
 
 from __future__ import annotations
 
-from math import sqrt
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
 
 from dikbench.arrays import Array, Indices
-from dikbench.scenario.reference.path import ReferencePath
+from dikbench.metrics.coverage import Coverage
+from dikbench.scenario.reference.embedded_path import SAME_INSTANT_S, EmbeddedPath
+from dikbench.scenario.scenario import Scenario
+from dikbench.simulation.trace import Trace
 
-SEARCH_AHEAD_M: Final = 0.02
-"""Path length ahead within which the nearest point is searched."""
+LAG_ALLOWED_S: Final = 0.1
+"""Lag [s] at the end of the reference up to which a motion is in time ..."""
 
-MIN_GAIN_FARTHER_AHEAD_M: Final = 1e-3
-"""A point farther ahead must be nearer by more than this and half a piece."""
+LAG_ALLOWED_SHARE: Final = 0.05
+"""... or up to this share of the nominal duration of the reference, where that is more."""
 
-COARSE_SEARCH_INSTANTS: Final = 256
-"""Approximate number of instants at which the whole path up to the target is searched."""
+DONE_SHARES: Final = (0.99, 0.90)
+"""Shares of the path for which the tolerances are computed at which they are covered."""
+
+ROUNDING: Final = 1e-9
+"""Tolerance of comparisons of path lengths [m] and of nominal times [s]."""
 
 
-def follow_path(path: ReferencePath, points: Array, targets: Array) -> Array:
-    """Compute how far along a path the points of a motion are.
+@dataclass(frozen=True, eq=False)
+class AlongPath:
+    """A motion of n control steps along a path that is not a point.
 
-    Each is at the nearest point of the path between where the motion was before and where the
-    target is: it never goes back, nor ahead of the target. It goes farther ahead than
-    `SEARCH_AHEAD_M` only if it is nearer there by more than `MIN_GAIN_FARTHER_AHEAD_M` (a corner
-    that was cut, a return that began too early), so that a frame that rests, or lags, at a crossing
-    of the path is not taken to be a lap ahead.
-
-    Args:
-        path: a path that is not a point.
-        points: of the motion, (n, 3) [m].
-        targets: path length to the target of each, not decreasing, (n,) [m].
-
-    Returns:
-        Path length to the nearest point, not decreasing, (n,) [m].
+    Attributes:
+        path: the path.
+        trace: the trace of the motion.
+        scenario: the case that it is a trace of.
+        points: of the motion, at the start and after each step, (n + 1, d) [m] (see `Embedding`).
+        apart: how far other frames of the first priority are from their targets in each segment,
+            (n + 1,) [m].
     """
-    stride = len(points) // COARSE_SEARCH_INSTANTS + 1
-    coarse = np.unique(np.append(np.arange(0, len(points), stride), len(points) - 1))
-    arcs = path.vertex_arcs
-    rough = arcs[_vertices(path, points[coarse], targets[coarse])]
-    start = np.interp(np.arange(len(points)), coarse, rough)
-    pieces = np.clip(np.searchsorted(arcs, start, side="right") - 1, 0, len(path.pieces) - 1)
-    found = np.minimum(_descend(path, points, pieces), targets)
-    along: Array = np.maximum.accumulate(found)
-    return along
 
+    path: EmbeddedPath
+    trace: Trace
+    scenario: Scenario
+    points: Array
+    apart: Array
 
-def _vertices(path: ReferencePath, points: Array, targets: Array) -> list[int]:
-    """Find the vertex of the path nearest to each point, by the rules of `follow_path`."""
-    middle = path.vertices.mean(axis=0)
-    V, P = path.vertices - middle, points - middle
-    # |V - p|^2 = [|V|^2, -2 V] [1, p] + |p|^2
-    Q = np.column_stack([np.einsum("ij,ij->i", V, V), -2 * V])
-    asked = np.column_stack([np.ones(len(P)), P])
-    sizes = np.einsum("ij,ij->i", P, P).tolist()
-    arcs = path.vertex_arcs
-    ends = (np.searchsorted(arcs, targets) + 1).tolist()
-    reach = np.searchsorted(arcs, arcs + SEARCH_AHEAD_M, side="right").tolist()
-    nearer = MIN_GAIN_FARTHER_AHEAD_M + float(np.diff(arcs).max()) / 2
-    here, found = 0, []
-    for p, size, end in zip(asked, sizes, ends, strict=True):
-        squares = Q[here : max(end, here + 1)] @ p
-        best = int(squares.argmin())
-        if best >= reach[here] - here:
-            close = int(squares[: reach[here] - here].argmin())
-            near, far = (sqrt(max(float(squares[k]) + size, 0.0)) for k in (close, best))
-            if not far + nearer < near:
-                best = close
-        here += best
-        found.append(here)
-    return found
+    @cached_property
+    def last_sample(self) -> int:
+        """Number of the last sample that a whole run comes to."""
+        scenario, by_clock = self.scenario, self.trace.mode == "time"
+        end = scenario.steps * scenario.dt if by_clock else scenario.reference.duration
+        return int(self.path.last_until(end))
 
+    @cached_property
+    def target_samples(self) -> Indices:
+        """Number of the last sample that may be covered at each instant, (n + 1,).
 
-def _descend(path: ReferencePath, points: Array, pieces: Indices) -> Array:
-    """Compute the path length [m] to the foot of each point, from piece to piece while nearer."""
-    last = len(path.pieces) - 1
-    arcs, unsettled = np.empty(len(points)), np.arange(len(points))
-    lengths = np.diff(path.vertex_arcs)
-    while len(unsettled):
-        here = pieces[unsettled]
-        choice = np.clip(here + np.array([[0], [-1], [1]]), 0, last)  # the piece itself wins a tie
-        shares, squares = path.feet(points[unsettled], choice)
-        best, each = squares.argmin(axis=0), np.arange(len(unsettled))
-        chosen = choice[best, each]
-        arcs[unsettled] = path.vertex_arcs[chosen] + shares[best, each] * lengths[chosen]
-        pieces[unsettled] = chosen
-        unsettled = unsettled[chosen != here]
-    return arcs
+        That of the target, or the path's last one where it waits for the robot.
+        """
+        if self.trace.mode == "path":
+            return np.full(self.trace.steps + 1, self.last_sample)
+        samples: Indices = np.minimum(self.path.last_until(self.trace.tau), self.last_sample)
+        return np.maximum.accumulate(samples)
+
+    @cached_property
+    def end_of_reference(self) -> int:
+        """Number of the instant at which the reference ends, or the run if that is before."""
+        end = self.scenario.reference.duration + 0.5 * self.trace.dt
+        return max(int(np.searchsorted(self.trace.tau, end, side="right")) - 1, 0)
+
+    @cached_property
+    def coverage(self) -> Coverage:
+        """How the path is covered in its order, for every tolerance."""
+        at_target = np.searchsorted(self.trace.tau, self.path.times - SAME_INSTANT_S)
+        at_target = np.minimum(at_target, self.trace.steps)
+        return Coverage(self.path.points, self.points, self.target_samples, at_target, self.apart)
+
+    @cached_property
+    def covered_at(self) -> Indices:
+        """The instants at which samples are covered at the scenario's own tolerance."""
+        return self.coverage.instants(self.scenario.tolerance_m)
+
+    @cached_property
+    def done(self) -> float:
+        """Share of the path that is covered at the end, at the scenario's own tolerance."""
+        if self._needed[2] <= self.scenario.tolerance_m:
+            return 1.0
+        arcs = self.path.arcs
+        return float(arcs[max(len(self.covered_at) - 1, 0)] / arcs[self.last_sample])
+
+    @cached_property
+    def lag(self) -> Array:
+        """Delay on the path until the reference ends, (k + 1,) [s].
+
+        The nominal time from the last sample covered, at the scenario's own tolerance, to the
+        target. Empty where that waits for the robot.
+        """
+        if self.trace.mode == "path":
+            return np.empty(0)
+        instants, times = np.arange(self.end_of_reference + 1), self.path.times
+        covered = np.searchsorted(self.covered_at, instants, side="right") - 1
+        late: Array = times[self.target_samples[instants]] - times[np.maximum(covered, 0)]
+        return late
+
+    @property
+    def tolerances(self) -> tuple[float, float, float]:
+        """The smallest tolerances [m] at which 99 % and 90 % are covered at the end, and in time.
+
+        In time is who is late by at most 0.1 s at the end of the reference, or 5 % of its nominal
+        duration where that is more; NaN where it waits for the robot. Infinite above 0.25 m.
+        """
+        done_99, done_90, _, in_time = self._needed
+        return done_99, done_90, in_time
+
+    @cached_property
+    def _needed(self) -> tuple[float, float, float, float]:
+        """The tolerances at which 99 %, 90 % and all are covered at the end, and in time [m]."""
+        by_clock, end, arcs = self.trace.mode == "time", self.end_of_reference, self.path.arcs
+        wanted = [share * arcs[self.last_sample] - ROUNDING for share in DONE_SHARES]
+        samples = [*np.searchsorted(arcs, wanted).tolist(), self.last_sample]
+        asked = [(sample, self.trace.steps) for sample in samples]
+        allowed = max(LAG_ALLOWED_S, LAG_ALLOWED_SHARE * self.scenario.reference.duration)
+        latest = self.path.times[self.target_samples[end]] - allowed - ROUNDING
+        sample = int(np.searchsorted(self.path.times, latest))
+        # Before anything is covered a motion counts as being at the start.
+        is_open = by_clock and sample > 0
+        found = self.coverage.needed([*asked, (sample, end)] if is_open else asked)
+        in_time = found[3] if is_open else 0.0 if by_clock else float("nan")
+        return found[0], found[1], found[2], in_time

@@ -7,17 +7,22 @@ from types import MappingProxyType
 
 import numpy as np
 
+from dikbench.metrics.chatter import CHATTER
 from dikbench.metrics.contour import CONTOUR
 from dikbench.metrics.distance_and_torque import CONSTRAINTS
 from dikbench.metrics.metric import Metric
 from dikbench.metrics.motion import Motion
 from dikbench.metrics.null_space_drift import NULL_SPACE_DRIFT
+from dikbench.metrics.path_following import PATH_FOLLOWING
 from dikbench.metrics.smoothness import SMOOTHNESS
 from dikbench.metrics.solver import SOLVER
 from dikbench.metrics.tracking import TRACKING
 from dikbench.metrics.violation import VIOLATION
 
-_KINDS = (TRACKING, CONTOUR, NULL_SPACE_DRIFT, VIOLATION, CONSTRAINTS, SMOOTHNESS, SOLVER)
+_KINDS = (
+    TRACKING, PATH_FOLLOWING, CONTOUR, NULL_SPACE_DRIFT, VIOLATION, CONSTRAINTS, SMOOTHNESS,
+    CHATTER, SOLVER,
+)  # fmt: skip
 
 METRICS: Mapping[str, Metric] = MappingProxyType(
     {metric.name: metric for kind in _KINDS for metric in kind}

@@ -4,18 +4,26 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 
-from dikbench.arrays import Array
-from dikbench.metrics.along_path import follow_path
+from dikbench.arrays import Array, Indices
+from dikbench.metrics.along_path import AlongPath
 from dikbench.problem.constraints import CollisionConstraint, TorqueConstraint
 from dikbench.problem.progress import progress, row_weights
 from dikbench.problem.tasks import PostureTask
-from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.kinematics import Kinematics, placements
 from dikbench.robots.limits import Interval
+from dikbench.scenario.reference.path import NEGLIGIBLE_LENGTH_M
 from dikbench.scenario.scenario import Scenario
 from dikbench.simulation.trace import Trace
+
+SINGULAR_VALUE_STRIDE: Final = 16
+"""The singular values of one matrix in so many are computed in any case."""
+
+BLUR: Final = 1e-6
+"""How much rounding may change a small singular value (m, rad) when its matrix is squared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +39,8 @@ class Motion:
         orientation_error: angle between them, (n + 1,) [rad]; NaN where the task is about the
             position only.
         jacobians: task Jacobians (m, rad), (n + 1, m, nv).
+        points: placements of the task frame as points, (n + 1, d) [m] (see `Embedding`).
+        target_points: those of its target, (n + 1, d) [m].
     """
 
     trace: Trace
@@ -39,6 +49,8 @@ class Motion:
     position_error: Array
     orientation_error: Array
     jacobians: Array
+    points: Array
+    target_points: Array
 
     @cached_property
     def achieved(self) -> Array:
@@ -97,40 +109,61 @@ class Motion:
         return path.distances(self.translations)
 
     @cached_property
-    def path_covered(self) -> Array:
-        """Path length from the start to the point where the frame is, (n + 1,) [m].
+    def tracking_error(self) -> Array:
+        """Distance from the target in position and orientation, (n + 1,) [m] (see `Embedding`).
 
-        It never decreases (see `follow_path`); empty where the target has no path or stays at a
-        point, or the task is about the orientation only.
+        Of several frames of the first priority the one that is farthest from its target counts.
         """
-        path, tau = self.scenario.path, self.trace.tau
-        if path is None or path.is_point or np.isnan(self.position_error[0]):
-            return np.empty(0)
-        return follow_path(path, self.translations, np.interp(tau, path.times, path.arcs))
+        away = np.linalg.norm(self.points - self.target_points, axis=1)
+        farthest: Array = np.maximum(away, self._held_apart[0])
+        return farthest
 
     @cached_property
-    def path_done(self) -> float:
-        """Share of the path that lies behind the frame at the end; NaN where there is none."""
-        path, covered = self.scenario.path, self.path_covered
-        return float(covered[-1] / path.arcs[-1]) if path and len(covered) else np.nan
+    def contour_error_6d(self) -> Array:
+        """Distance from the path in position and orientation, (n + 1,) [m] (see `Embedding`).
+
+        The nearest point of the whole path counts, whenever the reference is there. Of a target
+        without a path it is the distance from the target.
+        """
+        path = self.scenario.embedded_path
+        if path is None:
+            return self.tracking_error
+        away: Array = np.maximum(self.nearest_on_path[0], self._held_apart[0])
+        return away
 
     @cached_property
-    def lag(self) -> Array:
-        """Delay along the path, (n + 1,) [s].
+    def nearest_on_path(self) -> tuple[Array, Indices, Array]:
+        """See `EmbeddedPath.nearest`: of the task frame, at every instant."""
+        path = self.scenario.embedded_path
+        assert path is not None
+        return path.nearest(self.points)
 
-        The nominal time that the reference takes from the nearest point of the path (see
-        `follow_path`) to the target, without dwells, in which there is nothing to catch up; plus,
-        as a path-indexed target waits, the delay of the target itself: trace time - tau, 0 where
-        the reference moves with the clock. Where the reference is slow, a small distance is a long
-        delay. NaN where `path_covered` is empty.
+    @cached_property
+    def along_path(self) -> AlongPath | None:
+        """How it follows the path; None of a target without a path, or whose path is a point."""
+        path, scenario = self.scenario.embedded_path, self.scenario
+        if path is None or path.arcs[-1] <= NEGLIGIBLE_LENGTH_M:
+            return None
+        return AlongPath(path, self.trace, scenario, self.points, self._held_apart[1])
+
+    @cached_property
+    def _held_apart(self) -> tuple[Array, Array]:
+        """How far held frames are from their targets, (n + 1,) [m] each.
+
+        At the instants, and in the segments that lead to them.
         """
-        path, tau = self.scenario.path, self.trace.tau
-        if path is None or not len(self.path_covered):
-            return np.full(len(tau), np.nan)
-        target = np.interp(tau, path.times, path.moving_times)
-        behind = target - np.interp(self.path_covered, path.arcs, path.moving_times)
-        lag: Array = np.maximum(behind, 0.0) + (self.trace.dt * np.arange(len(tau)) - tau)
-        return lag
+        apart = np.zeros((2, self.trace.steps + 1))
+        for held in self.scenario.held_frames:
+            X = placements(self.scenario.robot, held.frame, self.trace.q)
+            away = held.embedding.points(X[:, :3, :3], X[:, :3, 3]) - held.target
+            ways = np.diff(away, axis=0)
+            squares = np.einsum("ij,ij->i", ways, ways)
+            along = np.einsum("ij,ij->i", -away[:-1], ways)
+            share = np.clip(along / np.where(squares > 0, squares, 1.0), 0.0, 1.0)
+            between = away.copy()
+            between[1:] = away[:-1] + share[:, None] * ways
+            apart = np.maximum(apart, np.linalg.norm([away, between], axis=2))
+        return apart[0], apart[1]
 
     @cached_property
     def second_task_error(self) -> Array:
@@ -186,7 +219,7 @@ class Motion:
     @cached_property
     def sigma_min(self) -> float:
         """Smallest singular value of the task Jacobian (m, rad) during the motion."""
-        return float(np.linalg.svd(self.jacobians, compute_uv=False)[:, -1].min())
+        return _smallest_singular_value(self.jacobians)
 
     @cached_property
     def _distances(self) -> list[Array]:
@@ -213,3 +246,34 @@ def _worst_excess(values: Array, interval: Interval | None) -> Array:
     outside: Array = np.maximum(values - interval.upper, interval.lower - values)
     worst: Array = outside.max(axis=1, initial=0.0)
     return worst
+
+
+def _smallest_singular_value(J: Array) -> float:
+    """Compute the smallest singular value that a sequence of matrices (k, m, n) comes to.
+
+    It changes by at most the norm of the change of its matrix (Weyl): the values of a few matrices
+    exclude most others, and a lower bound that takes a quarter of the time excludes most of these.
+    """
+    steps = np.arange(len(J))
+    group = steps // SINGULAR_VALUE_STRIDE
+    middle = np.minimum(group * SINGULAR_VALUE_STRIDE + SINGULAR_VALUE_STRIDE // 2, len(J) - 1)
+    values = np.linalg.svd(J[np.unique(middle)], compute_uv=False)[:, -1]
+    changes = np.diff(J, axis=0).reshape(len(J) - 1, J[0].size)
+    way = np.append(0.0, np.cumsum(np.sqrt(np.einsum("ki,ki->k", changes, changes))))
+    open_ = J[values[group] - np.abs(way - way[middle]) < values.min()]
+    open_ = open_[_singular_value_floor(open_) < values.min() + BLUR]
+    return float(np.linalg.svd(open_, compute_uv=False)[:, -1].min(initial=values.min()))
+
+
+def _singular_value_floor(J: Array) -> Array:
+    """Compute what the smallest singular value of each J (k, m, n) is not below, but for `BLUR`.
+
+    1/sigma_min^2 is the largest eigenvalue of (J J^T)^-1 and thus at most its Frobenius norm.
+    """
+    wide = J if J.shape[1] <= J.shape[2] else J.transpose(0, 2, 1)
+    try:
+        inverse = np.linalg.inv(wide @ wide.transpose(0, 2, 1))
+    except np.linalg.LinAlgError:  # one of them is singular
+        return np.zeros(len(J))
+    floor: Array = 1 / np.sqrt(np.linalg.norm(inverse, axis=(1, 2)))
+    return floor

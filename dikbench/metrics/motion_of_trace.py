@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 
 from dikbench.arrays import Array
+from dikbench.errors import DikbenchError
 from dikbench.metrics.motion import Motion
-from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.kinematics import Kinematics, placements
 from dikbench.scenario.scenario import Scenario
 from dikbench.simulation.trace import Trace
 
@@ -20,15 +20,14 @@ def motion_of(trace: Trace, scenario: Scenario, jacobians: Array | None = None) 
         scenario: the case of the trace.
         jacobians: the task Jacobians at all configurations but the last, (n, m, nv), if the run has
             computed them; otherwise they are computed, with the same result.
+
+    Raises:
+        DikbenchError: if the trace is not one of the scenario's robot.
     """
+    _check_sizes(trace, scenario)
     robot, frame = scenario.robot, scenario.robot.frame_id
-    model, data, n = robot.model, robot.model.createData(), trace.steps
-    rows = np.array(scenario.rows)
-    placements = []
-    for q in trace.q:
-        pin.forwardKinematics(model, data, q)
-        placements.append(pin.updateFramePlacement(model, data, frame).homogeneous)
-    X = np.array(placements)
+    n, rows = trace.steps, np.array(scenario.rows)
+    X = placements(robot, frame, trace.q)
     kinematics, J = Kinematics(robot), np.empty((n + 1, len(rows), robot.nv))
     known = 0 if jacobians is None else n
     if jacobians is not None:
@@ -52,7 +51,22 @@ def motion_of(trace: Trace, scenario: Scenario, jacobians: Array | None = None) 
             else np.full(n + 1, np.nan)
         ),
         jacobians=J,
+        points=scenario.embedding.points(X[:, :3, :3], X[:, :3, 3]),
+        target_points=scenario.embedding.points(target_rotations, target_translations),
     )
+
+
+def _check_sizes(trace: Trace, scenario: Scenario) -> None:
+    """Check that a trace has as many coordinates as the scenario's robot."""
+    robot = scenario.robot
+    sizes = {"q": robot.nq, "applied": robot.nv}
+    for name, size in sizes.items():
+        shape = getattr(trace, name).shape
+        if shape[1:] != (size,):
+            raise DikbenchError(
+                f"trace of another robot: {name} has shape {shape}; "
+                f"valid for {robot.name}: (steps, {size})"
+            )
 
 
 def _targets(trace: Trace, scenario: Scenario) -> tuple[Array, Array]:
@@ -61,7 +75,7 @@ def _targets(trace: Trace, scenario: Scenario) -> tuple[Array, Array]:
     if n <= scenario.steps and np.array_equal(trace.tau, np.arange(n + 1) * scenario.dt):
         rotations, translations = scenario.target_arrays
         return rotations[: n + 1], translations[: n + 1]
-    placements = [scenario.reference.placement(float(tau)) for tau in trace.tau]
+    placements = [scenario.target(float(tau))[0] for tau in trace.tau]
     return np.array([X.rotation for X in placements]), np.array([X.translation for X in placements])
 
 

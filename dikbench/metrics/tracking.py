@@ -67,7 +67,8 @@ TRACKING = (
         "length of the path that the origin of the task frame covered", path_length,
     ),
     *series_metrics(
-        "off_course", "rad", "angle between the achieved and the desired twist (L = 0.2 m)",
+        "direction_error", "rad",
+        "angle between J v and the twist that the task asks for there (L = 0.2 m): 0 for J^+ V",
         direction_error, "max", worst=pi,
     ),
     *series_metrics(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import groupby, pairwise
 from operator import attrgetter
 from typing import Final, Literal, Protocol, runtime_checkable
@@ -10,7 +10,7 @@ from typing import Final, Literal, Protocol, runtime_checkable
 import msgspec
 
 from dikbench.arrays import Array
-from dikbench.problem.tasks.task import LinearizedTask, stacked
+from dikbench.problem.tasks.task import LinearizedJointTask, LinearizedTask, stacked
 from dikbench.problem.velocity_box import Box, Braking, velocity_box
 from dikbench.programs.modelled_program import ModelledProgram
 from dikbench.programs.quadratic_program import ProgramKind, QuadraticProgram
@@ -18,6 +18,10 @@ from dikbench.robots.limits import Limits
 from dikbench.robots.robot import Robot
 
 LimitKind = Literal["position", "velocity", "acceleration", "inequalities"]
+
+ProblemPart = Literal["inequalities", "postures", "lower-tasks"]
+"""What a formulation may see of a problem in addition to the tasks of first priority, which all do:
+the rows G v <= h; joint tasks below the first priority; all tasks below it."""
 
 _PRIORITY: Final = attrgetter("priority")
 
@@ -97,9 +101,11 @@ class Formulation(Protocol):
     """A formulation of differential inverse kinematics: a frozen dataclass of parameters.
 
     In addition to `velocity` it may declare, as class attributes or properties, `program` (the kind
-    of program it has solved; default: none) and `keeps` (the limits it promises to keep; default:
-    none); a paragraph `Source: ...` in its docstring names the paper. The same problem gives the
-    same velocity.
+    of program it has solved; default: none), `keeps` (the limits it promises to keep; default:
+    none) and `sees` (the parts of a problem that it takes into account, see `ProblemPart`; default:
+    none but what it keeps). A method `refuses(problem)` says why it cannot answer problems of this
+    kind, and returns an empty text where it can. A paragraph `Source: ...` in its docstring names
+    the paper. The same problem gives the same velocity.
     """
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
@@ -120,3 +126,33 @@ def program_of(formulation: Formulation) -> ProgramKind | None:
 def promises_of(formulation: Formulation) -> frozenset[LimitKind]:
     """Return the kinds of limits that the formulation promises to keep."""
     return frozenset(getattr(formulation, "keeps", ()))
+
+
+def sight_of(formulation: Formulation) -> frozenset[ProblemPart]:
+    """What the formulation sees of a problem; the rows that it promises to keep it does."""
+    seen: set[ProblemPart] = set(getattr(formulation, "sees", ()))
+    if "inequalities" in promises_of(formulation):
+        seen.add("inequalities")
+    return frozenset(seen)
+
+
+def refusal_of(formulation: Formulation, problem: DikProblem) -> str:
+    """Why the formulation cannot answer problems of this kind; empty where it can."""
+    refuses: Callable[[DikProblem], str] | None = getattr(formulation, "refuses", None)
+    return "" if refuses is None else refuses(problem)
+
+
+def sees_constraints(formulation: Formulation, problem: DikProblem) -> bool | None:
+    """Whether the formulation sees the rows G v <= h; None where there are none."""
+    return None if problem.G is None else "inequalities" in sight_of(formulation)
+
+
+def sees_lower_tasks(formulation: Formulation, problem: DikProblem) -> bool | None:
+    """Whether the formulation sees every task below the first priority; None: there is none."""
+    first = problem.tasks[0].priority
+    lower = [task for task in problem.tasks if task.priority > first]
+    if not lower:
+        return None
+    seen = sight_of(formulation)
+    joints = all(isinstance(task, LinearizedJointTask) for task in lower)
+    return "lower-tasks" in seen or (joints and "postures" in seen)

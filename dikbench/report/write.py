@@ -16,7 +16,7 @@ from dikbench.report.tables.kinds import TIMING
 from dikbench.report.tables.markdown import markdown_rows
 from dikbench.report.tables.return_codes import TITLE as RETURN_CODES
 from dikbench.results.folder import ResultsFolder
-from dikbench.results.reading import read_results
+from dikbench.results.reading import read_results, without_attributes
 from dikbench.results.selected import with_selected
 from dikbench.statistics.stability import STABLE
 
@@ -30,7 +30,7 @@ def write_report(path: Path) -> str:
     Raises:
         DikbenchError: if the folder holds no results, or cannot be written.
     """
-    results = read_results(path, lenient=True)
+    results = without_attributes(read_results(path, lenient=True))
     try:
         contents = gather(results, draw_figures(results.folder, results.trials, results.manifest))
         codes = _write_tables(path, contents)

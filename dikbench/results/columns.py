@@ -6,10 +6,22 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
+from dikbench.metrics import OUTCOME_NUMBERS, OUTCOME_TEXTS
+
 TRIAL: Final = ["formulation", "solver", "scenario", "plant", "reference", "seed"]
 """Columns that identify the trial of a row."""
 
 KEYS: Final = (*TRIAL, "status", "message")
+SEES: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "sees_constraints": "whether the formulation sees the rows G v <= h of torques and "
+        "distances (1, 0; empty where there are none)",
+        "sees_lower_tasks": "whether the formulation sees every task below the first priority "
+        "(1, 0; empty where there is none)",
+    }
+)
+"""Columns of what a formulation sees of a scenario's problems, and what they say."""
+
 TIMED: Final = ["formulation", "solver", "scenario"]
 """Columns that identify the cell of a row of times."""
 
@@ -44,7 +56,7 @@ TIMES: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
 )
 """Columns of the timing pass: type in the store, and definition."""
 
-RENAMED: Final[Mapping[str, str]] = MappingProxyType(
+RENAMED_TIMES: Final[Mapping[str, str]] = MappingProxyType(
     {
         **{
             name.replace("formulation", "law", 1): name
@@ -54,7 +66,18 @@ RENAMED: Final[Mapping[str, str]] = MappingProxyType(
         "timing_verdict": "timing_stability",
     }
 )
+"""Columns of times of older results, and their names today."""
+
+RENAMED_METRICS: Final[Mapping[str, str]] = MappingProxyType(
+    {"off_course_max_rad": "direction_error_max_rad"}
+)
+"""Metrics of older results, and their names today."""
+
+RENAMED: Final[Mapping[str, str]] = MappingProxyType({**RENAMED_TIMES, **RENAMED_METRICS})
 """Columns of older results, and their names today."""
+
+REDEFINED: Final = ("path_done_share", "lag_max_s", "lag_final_s")
+"""Metrics that version 0.1 took of the position alone: what it stored of them is not read."""
 
 DESCRIBED: Final = MappingProxyType(
     {
@@ -68,6 +91,9 @@ DESCRIBED: Final = MappingProxyType(
         "status": ("", "how the trial ended"),
         "message": ("", "why, where it did not end well"),
         "steps": ("", "number of control steps"),
+        **{name: ("", text) for name, text in OUTCOME_TEXTS.items()},
+        **OUTCOME_NUMBERS,
+        **{name: ("", text) for name, text in SEES.items()},
         "wall_time_s": ("s", "time of the trial in its worker"),
         "control_time_s": ("s", "of it in kinematics, formulation and solver"),
         "environment": ("", "name of the worker's environment in the store"),

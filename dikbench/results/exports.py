@@ -11,13 +11,20 @@ from typing import Any, Final
 import pandas as pd
 
 from dikbench.errors import DikbenchError
-from dikbench.results.columns import KEYS, RENAMED
+from dikbench.metrics import OUTCOME_TEXTS
+from dikbench.results.columns import KEYS, REDEFINED, RENAMED, RENAMED_METRICS
 
 TRIALS: Final = "trials.csv"
 PARQUET: Final = "trials.parquet"
 MANIFEST: Final = "manifest.json"
 
-TEXT: Final = ("id", *(key for key in KEYS if key != "seed"), "environment", "timing_stability")
+TEXT: Final = (
+    "id",
+    *(key for key in KEYS if key != "seed"),
+    *OUTCOME_TEXTS,
+    "environment",
+    "timing_stability",
+)
 NEEDED: Final = tuple(name for name in KEYS if name != "message")
 """Columns that every row must have."""
 
@@ -38,14 +45,21 @@ def read_trials(folder: Path, notes: list[str]) -> pd.DataFrame:
         DikbenchError: if there are none, or they are damaged.
     """
     if not (folder / TRIALS).is_file() and (folder / PARQUET).is_file():
-        return _parquet(folder / PARQUET).rename(columns=RENAMED)
-    trials = _rows(folder / TRIALS, notes).rename(columns=RENAMED)
+        return _named_as_today(_parquet(folder / PARQUET))
+    trials = _named_as_today(_rows(folder / TRIALS, notes))
     for name in trials.columns:
         if name not in TEXT:
             trials[name] = _numbers(trials[name])
         elif name != "message":
             trials[name] = trials[name].replace("", None)
     return trials
+
+
+def _named_as_today(trials: pd.DataFrame) -> pd.DataFrame:
+    """Rename the columns of older results, without metrics that have another definition today."""
+    if not trials.columns.isin(list(RENAMED_METRICS)).any():
+        return trials.rename(columns=RENAMED)
+    return trials.drop(columns=list(REDEFINED), errors="ignore").rename(columns=RENAMED)
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:

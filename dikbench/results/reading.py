@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -11,8 +11,8 @@ import msgspec
 import pandas as pd
 
 from dikbench.errors import DikbenchError
-from dikbench.metrics import METRICS
-from dikbench.results.columns import DESCRIBED, KEYS, SELECTORS, TIMES
+from dikbench.metrics import METRICS, OUTCOME_NUMBERS, OUTCOME_TEXTS
+from dikbench.results.columns import DESCRIBED, KEYS, SEES, SELECTORS, TIMES
 from dikbench.results.exports import MANIFEST, are_exported, read_manifest, read_trials
 from dikbench.results.folder import ResultsFolder
 from dikbench.results.selected import selected_columns, with_selected
@@ -20,11 +20,13 @@ from dikbench.results.step_frames import steps_of
 from dikbench.results.store import OtherVersion
 from dikbench.selector import parse_selector
 
-TEXTS: Final = ("id", *KEYS, "environment", "timing_stability")
+TEXTS: Final = ("id", *KEYS, *OUTCOME_TEXTS, "environment", "timing_stability")
 NUMBERS: Final = (
     "seed",
     "steps",
     *METRICS,
+    *OUTCOME_NUMBERS,
+    *SEES,
     "wall_time_s",
     "control_time_s",
     *(name for name, (kind, _) in TIMES.items() if kind != "TEXT"),
@@ -138,7 +140,19 @@ def read_results(path: Path, *, lenient: bool = False) -> Results:
         trials = with_selected(trials)
     except DikbenchError as error:
         raise DikbenchError(f"{path}: {error}") from None
-    return Results(folder, manifest, _described(trials), tuple(notes))
+    # Columns that were added one by one lie apart, which pandas warns about.
+    return Results(folder, manifest, _described(trials.copy()), tuple(notes))
+
+
+def without_attributes(results: Results) -> Results:
+    """Return results whose rows carry no units and definitions.
+
+    Every operation of pandas copies the attributes of a frame, which takes far longer than the
+    operation itself.
+    """
+    trials = results.trials.copy()
+    trials.attrs = {}
+    return replace(results, trials=trials)
 
 
 def _stored_or_exported(
@@ -200,7 +214,8 @@ def _complete(rows: pd.DataFrame, notes: list[str]) -> pd.DataFrame:
             f"{count} {'row' if count == 1 else 'rows'} without a seed, steps or a selector that "
             "can be read left out."
         )
-    return found[whole].astype({"seed": int, "steps": int}).reset_index(drop=True)
+    typed = found[whole].astype({"seed": int, "steps": int}).reset_index(drop=True)
+    return typed.copy()  # astype leaves every column on its own, which pandas warns about
 
 
 def _named(rows: pd.DataFrame) -> pd.Series:

@@ -14,18 +14,27 @@ from typing import Any, Final, Self
 import pandas as pd
 
 from dikbench.errors import DikbenchError
-from dikbench.metrics import METRICS
-from dikbench.results.columns import KEYS, RENAMED, TIMED, TIMES, TRIAL
-from dikbench.scenario.oracle import ORACLE
+from dikbench.metrics import METRICS, OUTCOME_NUMBERS, OUTCOME_TEXTS
+from dikbench.results.columns import (
+    KEYS,
+    REDEFINED,
+    RENAMED_METRICS,
+    RENAMED_TIMES,
+    SEES,
+    TIMED,
+    TIMES,
+    TRIAL,
+)
+from dikbench.scenario.oracle import ORACLES
 from dikbench.study.identity import timing_id
 from dikbench.study.plan import PlannedTrial
 from dikbench.study.trial import Trial
 
-SCHEMA_VERSION: Final = 2
-"""Version of the tables below. Times of a store of version 1 are renamed when it is opened; other
-versions are refused."""
+SCHEMA_VERSION: Final = 3
+"""Version of the tables below. Stores of versions 1 and 2 are brought to it when they are opened;
+other versions are refused."""
 
-NUMBERS: Final = (*METRICS, "wall_time_s", "control_time_s")
+NUMBERS: Final = (*METRICS, *OUTCOME_NUMBERS, *SEES, "wall_time_s", "control_time_s")
 
 TABLES: Final = f"""
 CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL);
@@ -36,6 +45,7 @@ CREATE TABLE trials (
   formulation TEXT NOT NULL, solver TEXT NOT NULL, scenario TEXT NOT NULL,
   plant TEXT NOT NULL, reference TEXT NOT NULL, seed INTEGER NOT NULL,
   status TEXT NOT NULL, message TEXT NOT NULL, steps INTEGER NOT NULL,
+  {", ".join(f"{name} TEXT" for name in OUTCOME_TEXTS)},
   {", ".join(f"{name} REAL" for name in NUMBERS)},
   environment TEXT REFERENCES environments (id),
   run INTEGER NOT NULL REFERENCES runs (id),
@@ -67,11 +77,13 @@ class StoredTrial:
         id: see `trial_id`.
         trial: the cell.
         steps: number of its control steps.
+        status: how it ended, by its name.
     """
 
     id: str
     trial: Trial
     steps: int
+    status: str
 
 
 class Store:
@@ -137,7 +149,7 @@ class Store:
                 p.trial.formulation, p.trial.solver, p.trial.scenario
             )
             for p in planned
-            if p.trial.formulation.name != ORACLE
+            if p.trial.formulation.name not in ORACLES
         }
         self._database.executemany(
             "UPDATE OR REPLACE times SET formulation = ?, solver = ?, scenario = ? WHERE id = ?",
@@ -157,10 +169,12 @@ class Store:
 
     def stored_trials(self) -> list[StoredTrial]:
         """List every trial that is shown."""
-        rows = self._rows(f"SELECT id, steps, {', '.join(TRIAL)} FROM trials WHERE NOT superseded")
+        rows = self._rows(
+            f"SELECT id, steps, status, {', '.join(TRIAL)} FROM trials WHERE NOT superseded"
+        )
         return [
-            StoredTrial(name, Trial.of(**dict(zip(TRIAL, cell, strict=True))), steps)
-            for name, steps, *cell in rows
+            StoredTrial(name, Trial.of(**dict(zip(TRIAL, cell, strict=True))), steps, status)
+            for name, steps, status, *cell in rows
         ]
 
     def timed(self) -> set[str]:
@@ -182,12 +196,12 @@ class Store:
 
     def record_trial(self, row: Mapping[str, Any], run: int, position: int) -> None:
         """Commit the row of a finished trial, replacing an earlier one."""
-        columns = ("id", *KEYS, "steps", *NUMBERS, "environment")
+        columns = ("id", *KEYS, "steps", *OUTCOME_TEXTS, *NUMBERS, "environment")
         values = {name: row.get(name) for name in columns}
         self._insert("trials", {**values, "run": run, "position": position})
 
-    def record_metrics(self, trial: str, metrics: Mapping[str, float]) -> None:
-        """Commit the metrics of a trial that has a row, and nothing else of it."""
+    def record_metrics(self, trial: str, metrics: Mapping[str, Any]) -> None:
+        """Commit the metrics and the outcome of a trial that has a row, and nothing else of it."""
         self._check_untouched()
         with self._guarded():
             self._database.execute(
@@ -202,7 +216,8 @@ class Store:
 
     def trials(self) -> pd.DataFrame:
         """Return every trial with its times, those of the last plan first and in its order."""
-        order = ", ".join(["id", *KEYS, "steps", *NUMBERS, "environment", "run"])
+        columns = ["id", *KEYS, "steps", *OUTCOME_TEXTS, *NUMBERS, "environment", "run"]
+        order = ", ".join(columns)
         trials = self._frame(
             f"SELECT {order} FROM trials WHERE NOT superseded "
             f"ORDER BY position IS NULL, position, {', '.join(TRIAL)}",
@@ -303,26 +318,38 @@ class Store:
             columns = [row[1] for row in self._database.execute("PRAGMA table_info(trials)")]
         except sqlite3.DatabaseError as error:
             raise DikbenchError(f"store {self.path}: not a store of dikbench: {error}") from None
-        if found.get("schema") not in ("1", str(SCHEMA_VERSION)):
+        if found.get("schema") not in ("1", "2", str(SCHEMA_VERSION)):
             raise OtherVersion(
                 f"store {self.path}: schema version {found.get('schema')!r} is not known; this "
-                f"dikbench reads versions 1 and {SCHEMA_VERSION}"
+                f"dikbench reads versions 1 to {SCHEMA_VERSION}"
             )
-        missing = [name for name in NUMBERS if name not in columns]
+        named_today = {RENAMED_METRICS.get(name, name) for name in columns}
+        missing = [name for name in (*NUMBERS, *OUTCOME_TEXTS) if name not in named_today]
         if missing and not add_metrics:
             raise OtherVersion(
                 f"store {self.path}: written by a dikbench with other metrics (it lacks "
                 f"{min(missing)!r}); choose another folder, or add them with `dikbench recompute`"
             )
-        if found["schema"] == "1":
-            self._rename_times()
+        if found["schema"] != str(SCHEMA_VERSION):
+            self._migrate(columns, times=found["schema"] == "1")
         for name in missing:
-            self._database.execute(f"ALTER TABLE trials ADD COLUMN {name} REAL")
+            kind = "TEXT" if name in OUTCOME_TEXTS else "REAL"
+            self._database.execute(f"ALTER TABLE trials ADD COLUMN {name} {kind}")
 
-    def _rename_times(self) -> None:
-        """Rename the columns of times of version 1."""
+    def _migrate(self, columns: Sequence[str], *, times: bool) -> None:
+        """Bring the tables of an earlier version, with these columns of trials, to today's.
+
+        Metrics and, of version 1, times are renamed; values of metrics that have another definition
+        today are deleted, to be recomputed.
+        """
+        renamed = {old: new for old, new in RENAMED_METRICS.items() if old in columns}
         with self._guarded(), self._transaction():
-            for old, new in RENAMED.items():
+            for old, new in renamed.items():
+                self._database.execute(f"ALTER TABLE trials RENAME COLUMN {old} TO {new}")
+            for name in REDEFINED:
+                if name in columns:
+                    self._database.execute(f"UPDATE trials SET {name} = NULL")
+            for old, new in RENAMED_TIMES.items() if times else ():
                 self._database.execute(f"ALTER TABLE times RENAME COLUMN {old} TO {new}")
             self._database.execute(
                 "UPDATE meta SET value = ? WHERE key = 'schema'", [str(SCHEMA_VERSION)]

@@ -68,3 +68,13 @@ class Kinematics:
 def smallest_singular_value(J: Array) -> float:
     """Compute the smallest of the min(m, n) singular values of a task Jacobian (m, n)."""
     return float(np.linalg.svd(J, compute_uv=False)[-1])
+
+
+def placements(robot: Robot, frame: int, q: Array) -> Array:
+    """Compute the placements of a frame at configurations (n, nq), (n, 4, 4)."""
+    model, data = robot.model, robot.model.createData()
+    found = []
+    for each in q:
+        pin.forwardKinematics(model, data, each)
+        found.append(pin.updateFramePlacement(model, data, frame).homogeneous)
+    return np.array(found)

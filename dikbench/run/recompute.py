@@ -1,4 +1,4 @@
-"""Recomputes all metrics from stored traces, so that a changed metric needs no rerun."""
+"""Recomputes metrics and outcomes from stored traces, so that a changed one needs no rerun."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from concurrent.futures import Future, as_completed
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from types import MappingProxyType
+from typing import Any, Final
 
 from dikbench.errors import DikbenchError
-from dikbench.metrics import evaluate, motion_of
+from dikbench.metrics import evaluate, motion_of, outcome_columns
 from dikbench.results.folder import ResultsFolder
 from dikbench.results.store import Store, StoredTrial
 from dikbench.run.pool import workers
@@ -21,8 +22,12 @@ from dikbench.run.runner import Interrupted
 from dikbench.run.trial_row import scenario_of
 from dikbench.run.worker_process import restore_process
 from dikbench.scenario.scenario import Scenario
+from dikbench.simulation.status import Status
 from dikbench.simulation.trace import Trace
 from dikbench.study.identity import trial_id
+
+STATUSES: Final = MappingProxyType({status.value: status for status in Status})
+"""Statuses by their names."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +59,7 @@ class Recomputed:
 
 
 def recompute_results(out: Path, jobs: int, command: str) -> Recomputed:
-    """Compute every metric of a results folder again from its traces, and export it.
+    """Compute metrics and outcomes of a results folder again from its traces, and export it.
 
     A trial is recomputed only if its formulation and scenario are unchanged.
 
@@ -128,8 +133,8 @@ def _recompute(
     return failed
 
 
-def metrics_of(stored: StoredTrial, file: Path) -> dict[str, float]:
-    """Compute the metrics of a trial from its trace, in a worker process.
+def metrics_of(stored: StoredTrial, file: Path) -> dict[str, Any]:
+    """Compute the metrics and the outcome of a trial from its trace, in a worker process.
 
     Raises:
         DikbenchError: if the trace cannot be read, or is not one of this trial.
@@ -138,7 +143,8 @@ def metrics_of(stored: StoredTrial, file: Path) -> dict[str, float]:
     scenario = scenario_of(stored.trial.scenario, stored.trial.seed)
     trace = Trace.load(file)
     _check_fits(trace, scenario, stored.steps, file)
-    return evaluate(motion_of(trace, scenario))
+    motion = motion_of(trace, scenario)
+    return {**evaluate(motion), **outcome_columns(motion, STATUSES[stored.status])}
 
 
 def _check_fits(trace: Trace, scenario: Scenario, steps: int, file: Path) -> None:

@@ -22,7 +22,7 @@ from dikbench.run.progress_display import ProgressDisplay
 from dikbench.run.provenance import environment, git_commit, manifest
 from dikbench.run.timing import Contender, time_scenario
 from dikbench.run.trial_row import CannotStore, TracePolicy, TrialRow, row_without_run, work
-from dikbench.scenario.oracle import ORACLE
+from dikbench.scenario.oracle import ORACLES
 from dikbench.selector import Selector, parse_selector
 from dikbench.simulation.status import Status
 from dikbench.study.identity import timing_id
@@ -233,7 +233,7 @@ def _time(
             cell
             for p in planned
             if not p.skip
-            and p.trial.formulation.name != ORACLE
+            and p.trial.formulation.name not in ORACLES
             and (cell := (p.trial.formulation, p.trial.solver)) not in fatal
         )
     )

@@ -16,7 +16,7 @@ import numpy as np
 from dikbench.arrays import Array
 from dikbench.plugins.building import make_formulation
 from dikbench.problem.posing import pose_problem
-from dikbench.problem.problem import DikProblem, Formulation, Solve
+from dikbench.problem.problem import DikProblem, Formulation, Solve, refusal_of
 from dikbench.results.columns import CONTROL_RATES_HZ
 from dikbench.robots.kinematics import Kinematics
 from dikbench.run.trial_row import TrialRow, scenario_of, solve_of
@@ -131,8 +131,13 @@ def undisturbed() -> Iterator[None]:
 def _time_formulation(
     formulation: Formulation, solve: CheckedSolve, segment: Sequence[DikProblem]
 ) -> Array:
-    """Time a formulation on each problem, (parts, problems) [ns]; NaN after it fails."""
+    """Time a formulation on each problem, (parts, problems) [ns]; NaN after it fails.
+
+    A formulation that refuses such problems is not timed.
+    """
     times = np.full((len(TIME_PARTS), len(segment)), np.nan)
+    if refusal_of(formulation, segment[0]):
+        return times
     found = []
     try:
         for problem in segment[:LEAD_IN_PROBLEMS]:

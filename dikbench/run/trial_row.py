@@ -10,17 +10,25 @@ from time import perf_counter
 from typing import Any, Literal
 
 from dikbench.errors import DikbenchError
-from dikbench.metrics import evaluate, motion_of
+from dikbench.metrics import Outcome, evaluate, motion_of, outcome_columns
 from dikbench.plugins.building import make_formulation, make_plant, make_scenario
-from dikbench.problem.problem import program_of
+from dikbench.problem.posing import pose_problem
+from dikbench.problem.problem import (
+    DikProblem,
+    program_of,
+    refusal_of,
+    sees_constraints,
+    sees_lower_tasks,
+)
+from dikbench.robots.kinematics import Kinematics
 from dikbench.run.provenance import environment
 from dikbench.run.worker_process import restore_process
-from dikbench.scenario.oracle import ORACLE
+from dikbench.scenario.oracle import ORACLES
 from dikbench.scenario.scenario import Scenario
 from dikbench.selector import Selector
 from dikbench.simulation.clock import ReferenceMode
 from dikbench.simulation.closed_loop import simulate
-from dikbench.simulation.oracle_formulation import OracleFormulation
+from dikbench.simulation.oracle_formulation import oracle_of
 from dikbench.simulation.status import Status
 from dikbench.solvers.catalogue.back_ends import parse_solver
 from dikbench.solvers.checked_solve import CheckedSolve, make_solve
@@ -51,7 +59,11 @@ def solve_of(formulation: Selector, solver: Selector, *, checks: bool = True) ->
 
 def row_without_run(trial: Trial, status: Status, message: str) -> TrialRow:
     """Make the row of a trial of which nothing can be measured."""
-    return {**trial.row, "status": status.value, "message": message, "steps": 0}
+    row = {**trial.row, "status": status.value, "message": message, "steps": 0}
+    if status is Status.SKIPPED:
+        return row
+    did_not_run = Outcome.DID_NOT_RUN.value
+    return {**row, "outcome": did_not_run, "decided_before": did_not_run}
 
 
 @lru_cache(maxsize=4)
@@ -103,8 +115,9 @@ def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "al
         policy: whether the trace is kept.
 
     Returns:
-        Its row: keys, status, message, number of steps, every metric; `wall_time_s` of the run and
-        `control_time_s` in kinematics, formulation and solver.
+        Its row: keys, status, message, number of steps, every metric, the outcome; what the
+        formulation sees of the problem, where there is something to see; `wall_time_s` of the run
+        and `control_time_s` in kinematics, formulation and solver.
 
     Raises:
         CannotStore: if the trace cannot be written.
@@ -116,16 +129,25 @@ def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "al
     if trial.reference == "path" and not scenario.reference.moving:
         reason = "the scenario has no path that could wait for the robot"
         return row_without_run(trial, Status.SKIPPED, reason)
-    oracle = trial.formulation.name == ORACLE
-    if oracle and scenario.oracle is None:
-        reason = "no joint motion does what the scenario asks for"
+    oracle = trial.formulation.name in ORACLES
+    formulation = (
+        oracle_of(trial.formulation.name, scenario)
+        if oracle
+        else make_formulation(trial.formulation)
+    )
+    if formulation is None:
+        reason = "no joint motion is known that does what the scenario asks for"
+        return row_without_run(trial, Status.SKIPPED, reason)
+    problem = first_problem(scenario)
+    reason = refusal_of(formulation, problem)
+    if reason:
         return row_without_run(trial, Status.SKIPPED, reason)
     plant = make_plant(trial.plant)
     mode: ReferenceMode = "path" if trial.reference == "path" else "time"
     start = perf_counter()
     run = simulate(
         scenario,
-        OracleFormulation.of(scenario) if oracle else make_formulation(trial.formulation),
+        formulation,
         make_solve(None, None) if oracle else solve_of(trial.formulation, trial.solver),
         plant,
         mode,
@@ -135,21 +157,31 @@ def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "al
         policy == "all" or (policy == "failures" and run.status is not Status.OK)
     ):
         _keep(run.trace.save, trace)
-    metrics: Mapping[str, float] = {}
+    metrics: Mapping[str, Any] = {}
     if run.trace.steps:
         seen = (
             None if plant.noise else run.jacobians
         )  # noise makes them differ from the true motion's
-        metrics = evaluate(motion_of(run.trace, scenario, seen))
+        motion = motion_of(run.trace, scenario, seen)
+        metrics = {**evaluate(motion), **outcome_columns(motion, run.status)}
     return {
-        **trial.row,
-        "status": run.status.value,
-        "message": run.message,
+        **row_without_run(trial, run.status, run.message),
         "steps": run.trace.steps,
         **metrics,
+        "sees_constraints": None if oracle else sees_constraints(formulation, problem),
+        "sees_lower_tasks": None if oracle else sees_lower_tasks(formulation, problem),
         "wall_time_s": perf_counter() - start,
         "control_time_s": (run.kinematics_ns + run.formulation_ns) / 1e9,
     }
+
+
+def first_problem(scenario: Scenario) -> DikProblem:
+    """The problem of a scenario's first control step."""
+    kinematics = Kinematics(scenario.robot)
+    kinematics.update(scenario.q0)
+    task = scenario.tracking.linearize(kinematics, *scenario.target(0.0))
+    tasks, constraints = scenario.tasks, scenario.constraints
+    return pose_problem(kinematics, scenario.v0, scenario.dt, task, tasks, constraints)
 
 
 def _keep(save: Any, path: Path) -> None:

@@ -38,6 +38,7 @@ from dikbench.scenario.building import (
     check_can_lift,
     collision_claims,
     duration_at,
+    from_rest_to_rest,
     influence_distance,
     least_norm_share,
     limits_in_force,
@@ -71,10 +72,12 @@ from dikbench.scenario.singularity import (
     make_singular,
     singular_postures,
 )
+from dikbench.scenario.situation import SINGULAR_NEED, Situation
 from dikbench.scenario.variation import Perturbation, Variation
 
 __all__ = [
     "POSTURE_WEIGHT",
+    "SINGULAR_NEED",
     "Array",
     "BoxObstacle",
     "CapsuleObstacle",
@@ -105,6 +108,7 @@ __all__ = [
     "Robot",
     "Scenario",
     "Singularity",
+    "Situation",
     "SphereObstacle",
     "Task",
     "Time",
@@ -120,6 +124,7 @@ __all__ = [
     "damped_least_squares",
     "duration_at",
     "effort_limits",
+    "from_rest_to_rest",
     "influence_distance",
     "joint_oracle",
     "joint_path",

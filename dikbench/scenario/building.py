@@ -19,7 +19,7 @@ from dikbench.problem.tasks import PostureTask, Task, TrackingTask
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.robot import Robot
 from dikbench.scenario.certificate import Claim
-from dikbench.scenario.oracle import POSE, OracleMotion, oracle_motion
+from dikbench.scenario.oracle import POSE, OracleMotion, measure_motion, oracle_motion
 from dikbench.scenario.reference.reference import Reference
 from dikbench.scenario.steps import steps_in
 
@@ -198,6 +198,24 @@ def motion_of_a_step(robot: Robot, q0: Array, twist: Array, gain: float) -> Orac
         lambda tau: gain * twist,
     )
     return oracle_motion(robot, straight, q0, np.linspace(0.0, straight.duration, 51))
+
+
+def from_rest_to_rest(
+    robot: Robot, way: OracleMotion, duration: float, tracking: TrackingTask = POSE
+) -> OracleMotion:
+    """Measure a motion along the configurations of another, from rest to rest.
+
+    The share of the other's time that is passed is sin^2(pi t/(2 T)).
+
+    Args:
+        robot: the robot.
+        way: the other motion, of which the configurations at its samples are kept.
+        duration: T [s].
+        tracking: the task that follows the reference.
+    """
+    shares = (way.instants - way.instants[0]) / (way.instants[-1] - way.instants[0])
+    instants = 2 * duration / pi * np.arcsin(np.sqrt(shares))
+    return measure_motion(robot, instants, way.q, tracking)
 
 
 def step_claims(motion: OracleMotion) -> tuple[Claim, Claim]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, ClassVar, Final
 
 import numpy as np
 import pinocchio as pin
@@ -23,10 +23,18 @@ from dikbench.scenario.building import (
     start_velocity,
 )
 from dikbench.scenario.certificate import Certificate, Claim
-from dikbench.scenario.oracle import POSE, OracleMotion, oracle_motion
+from dikbench.scenario.infeasible import infeasible_because
+from dikbench.scenario.oracle import POSE, OracleMotion, oracle_motion, position_margin
 from dikbench.scenario.reference.reference import Reference
-from dikbench.scenario.scenario import Scenario, first_level
+from dikbench.scenario.scenario import Judged, Scenario, first_level
+from dikbench.scenario.situation import Situation, situation_of
+from dikbench.scenario.tolerance import sampling_floor, tolerance_above
 from dikbench.scenario.variation import NO_VARIATION, Perturbation, Variation
+from dikbench.scenario.witness import Feasible, Witness, beyond, followable, witness_of
+
+RETURN_TIME_CONSTANTS: Final = 5.0
+"""Time constants 1/gain of the tracking task for which a time-indexed run goes on with the target
+at rest at its end: an error falls to less than a hundredth."""
 
 Gain = Annotated[float, Range(above=0.0, unit="1/s")]
 """The gain of a task, the desired velocity per error."""
@@ -48,8 +56,12 @@ class Case:
         tracking: the task that follows the reference; default: the whole pose.
         v0: joint velocity at the start, (nv,) [rad/s or m/s]; default: the reference's own.
         tasks: other tasks; default: hold the posture q0 in the null space, where there is one.
-        duration: length of a time-indexed run [s]; default: the reference's.
         constraints: conditions in addition to the joint limits.
+        witness: a joint motion that does the task and keeps limits and distances where `motion`
+            does not.
+        followable_until, comes_back: see `Scenario`; default: those of `motion`, from end to end
+            where there is none.
+        situation: what is difficult about it; default: what its motion says (`situation_of`).
     """
 
     reference: Reference
@@ -60,8 +72,11 @@ class Case:
     tracking: TrackingTask | None = None
     v0: Array | None = None
     tasks: tuple[Task, ...] | None = None
-    duration: float | None = None
     constraints: tuple[Constraint, ...] = ()
+    witness: OracleMotion | None = None
+    followable_until: float | None = None
+    comes_back: bool = True
+    situation: Situation | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,6 +97,9 @@ class Family(Parameters, ABC):
         variation: the ranges of what a seed perturbs.
         grid: the two parameters of a phase diagram, horizontal and vertical.
         about_position_limits: whether figures show the distance to the position limits.
+        tolerance_m, judged, longest_path_run: see `Scenario`.
+        outruns_sampling: whether its speeds may take an exact formulation off the path in a control
+            period, so that the tolerance is raised (see `dikbench.scenario.tolerance`).
     """
 
     robot: str = "panda"
@@ -94,6 +112,10 @@ class Family(Parameters, ABC):
     variation: ClassVar[Variation] = NO_VARIATION
     grid: ClassVar[tuple[str, str] | None] = None
     about_position_limits: ClassVar[bool] = False
+    tolerance_m: ClassVar[float] = 0.005
+    outruns_sampling: ClassVar[bool] = False
+    judged: ClassVar[Judged] = "path"
+    longest_path_run: ClassVar[float] = 5.0
 
     def __init_subclass__(cls, **options: Any) -> None:
         """Refuse class variables of another kind than figures, checks and seeds need.
@@ -145,6 +167,19 @@ class Family(Parameters, ABC):
             tasks = secondary_tasks(robot, case.q0, tracking)
         if v0 is None:
             v0 = start_velocity(robot, case.reference, case.q0, first_level(tracking, tasks))
+        witness = _first_witness(case, robot, v0)
+        feasible, duration = _feasible(case.reference, witness), case.reference.duration
+        until, comes_back = case.followable_until, case.comes_back
+        if witness is None and case.motion is not None:
+            left = beyond(robot, case.motion, case.constraints, duration)
+            until, comes_back = followable(case.motion.instants, left)
+        moving = case.reference.moving
+        situation = case.situation or situation_of(
+            case.motion, case.constraints, position_margin(robot, case.q0), moving=moving
+        )
+        if moving:
+            # It rests at its end for as long as it takes to see who is late and who comes back.
+            duration += RETURN_TIME_CONSTANTS / self.gain + _lateness(case.motion, witness)
         made = Scenario(
             robot=robot,
             q0=case.q0,
@@ -152,14 +187,28 @@ class Family(Parameters, ABC):
             reference=case.reference,
             tracking=tracking,
             dt=self.dt,
-            duration=case.reference.duration if case.duration is None else case.duration,
+            duration=duration,
             certificate=Certificate(case.claims),
             tasks=tasks,
             motion=case.motion,
             variation=self.variation,
             constraints=case.constraints,
+            tolerance_m=self.tolerance_m,
+            judged=self.judged,
+            longest_path_run=self.longest_path_run,
+            feasible=feasible,
+            witness=witness,
+            followable_until=until,
+            comes_back=comes_back,
+            situation=situation,
         )
         made.certificate.check(type(self).__name__)
+        if self.outruns_sampling:
+            tolerance = tolerance_above(sampling_floor(made), self.tolerance_m)
+            if tolerance > self.tolerance_m:
+                made = replace(made, tolerance_m=tolerance)
+        if made.feasible == "unknown" and (reason := infeasible_because(made)):
+            return replace(made, feasible="no", infeasible_because=reason)
         return made
 
     def exact_motion(
@@ -177,6 +226,36 @@ class Family(Parameters, ABC):
         """
         instants = samples(reference.duration, self.dt, most)
         return oracle_motion(robot, reference, q0, instants, tracking)
+
+
+def _first_witness(case: Case, robot: Robot, v0: Array) -> Witness | None:
+    """Return the first of a case's joint motions that is a witness; None where none is."""
+    for motion in (case.motion, case.witness):
+        if motion is not None:
+            duration = case.reference.duration
+            witness = witness_of(robot, motion, case.constraints, v0, duration)
+            if witness is not None:
+                return witness
+    return None
+
+
+def _feasible(reference: Reference, witness: Witness | None) -> Feasible:
+    """Say what a witness shows of a reference."""
+    if witness is None:
+        return "unknown"
+    if reference.moving:
+        return "time" if witness.by_clock else "path"
+    there = float(witness.motion.instants[-1]) + witness.lateness
+    return "time" if there <= reference.duration else "unknown"
+
+
+def _lateness(motion: OracleMotion | None, witness: Witness | None) -> float:
+    """Compute how late [s] the slowed motion is, or the exact one within its speed limits."""
+    if witness is not None:
+        return witness.lateness
+    if motion is None:
+        return 0.0
+    return float((np.diff(motion.instants) * np.maximum(motion.speed_ratio - 1, 0.0)).sum())
 
 
 def _names(value: object) -> bool:

@@ -19,6 +19,12 @@ from dikbench.scenario.reference.reference import Reference
 ORACLE = "oracle"
 """The name of the formulation in rows that score this joint motion itself."""
 
+SLOWED_ORACLE = "slowed-oracle"
+"""The name in rows that score a joint motion slowed down until it keeps all limits."""
+
+ORACLES = (ORACLE, SLOWED_ORACLE)
+"""Formulations of the harness itself, which know the joint motion and do not compete."""
+
 POSE = PoseTask()
 
 

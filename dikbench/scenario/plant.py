@@ -7,20 +7,43 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Annotated, Final
+from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from dikbench.arrays import Array, read_only
 from dikbench.parameters import Parameters, Range
+from dikbench.problem.constraints import CollisionConstraint, TorqueConstraint
 from dikbench.robots.limits import Limits
 from dikbench.scenario.scenario import Scenario
+from dikbench.scenario.violation import Violation, broken_limit, collision
+from dikbench.scenario.witness import INSIDE_SHARE
 
 LONGEST_DELAY_STEPS: Final = 1000
 
 NOISE_STREAM: Final = 3
 """Number of the random stream of the noise, which differs from those of a seed's scenario."""
+
+
+class ProtectiveStop(Exception):
+    """The plant stopped the robot; the message says what was broken."""
+
+
+class Step(NamedTuple):
+    """A control step that was applied.
+
+    Attributes:
+        number: of the instant after it.
+        q_before, q: configurations at its start and its end, (nq,).
+        v_before, v: velocities before and in it, (nv,) [rad/s or m/s].
+    """
+
+    number: int
+    q_before: Array
+    q: Array
+    v_before: Array
+    v: Array
 
 
 @dataclass(frozen=True)
@@ -47,6 +70,10 @@ class Plant(Parameters, ABC):
             dt: control period [s].
         """
 
+    def watch(self, scenario: Scenario, step: Step) -> Violation | None:
+        """Find what a step broke that ends the run; None, unless the plant stops the robot."""
+        return None
+
     def start(self, scenario: Scenario, seed: int) -> StartedPlant:
         """Start a trial of a scenario, with a seed for the noise."""
         return StartedPlant(self, scenario, seed)
@@ -55,10 +82,13 @@ class Plant(Parameters, ABC):
 class StartedPlant:
     """A plant in one trial: its random numbers and the commands that have not arrived."""
 
-    __slots__ = ("_arriving", "_drive", "_dt", "_model", "_noise", "_random")
+    __slots__ = (
+        "_arriving", "_drive", "_dt", "_model", "_noise", "_random", "_scenario", "_watch",
+    )  # fmt: skip
 
     def __init__(self, plant: Plant, scenario: Scenario, seed: int) -> None:
-        self._drive, self._noise = plant.drive, plant.noise
+        self._drive, self._watch, self._noise = plant.drive, plant.watch, plant.noise
+        self._scenario = scenario
         self._model, self._dt = scenario.robot.model, scenario.dt
         self._random = np.random.default_rng([seed, NOISE_STREAM])
         self._arriving = deque([read_only(scenario.v0.copy())] * plant.delay)
@@ -84,6 +114,16 @@ class StartedPlant:
         arrived = self._arriving.popleft()
         applied = self._drive(arrived, limits, self._dt)
         return applied if applied is arrived else read_only(applied)
+
+    def watch(self, step: Step) -> None:
+        """Watch a step that was applied.
+
+        Raises:
+            ProtectiveStop: if the plant stops the robot for what the step broke.
+        """
+        broken = self._watch(self._scenario, step)
+        if broken:
+            raise ProtectiveStop(f"{broken.reason} = {broken.figure:.4g}")
 
 
 @dataclass(frozen=True)
@@ -111,8 +151,45 @@ class Saturating(Plant):
         return v
 
 
+@dataclass(frozen=True)
+class Protective(Plant):
+    """Applies the command and stops at the first limit or distance that is broken, as drives do."""
+
+    def drive(self, v: Array, limits: Limits, dt: float) -> Array:
+        """Return the command (see `Plant.drive`)."""
+        return v
+
+    def watch(self, scenario: Scenario, step: Step) -> Violation | None:
+        """Find what the step broke (see `Plant.watch`)."""
+        robot, constraints = scenario.robot, scenario.constraints
+        distances = [
+            each.distances(robot, step.q[None]) - each.margin
+            for each in constraints
+            if isinstance(each, CollisionConstraint)
+        ]
+        torques = [
+            each.torques(robot, step.q_before[None], step.v[None], step.v_before[None], scenario.dt)
+            for each in constraints
+            if isinstance(each, TorqueConstraint)
+        ]
+        effort = robot.limits.effort
+        usage = np.empty(0)
+        if torques and effort is not None:
+            usage = effort.usage(torques[0]).max(axis=1)
+        seconds = step.number * scenario.dt
+        late = seconds >= INSIDE_SHARE * scenario.reference.duration
+        return (distances and collision(np.min(distances, axis=0))) or broken_limit(
+            robot,
+            np.stack([scenario.q0, step.q]),
+            np.array([False, late]),
+            step.v[None],
+            (step.v - step.v_before)[None] / scenario.dt,
+            usage,
+        )
+
+
 PLANTS: Final[Mapping[str, type[Plant]]] = MappingProxyType(
-    {"ideal": Ideal, "saturating": Saturating}
+    {"ideal": Ideal, "saturating": Saturating, "protective": Protective}
 )
 
 

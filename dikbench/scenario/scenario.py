@@ -4,21 +4,32 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Final, Literal
 
 import numpy as np
 import pinocchio as pin
 
 from dikbench.arrays import Array
-from dikbench.problem.constraints import Constraint
+from dikbench.problem.constraints import Constraint, TorqueConstraint
+from dikbench.problem.embedding import Embedding, embedding_of
 from dikbench.problem.tasks import Task, TrackingTask, TrackingTogether
 from dikbench.robots.robot import Robot
 from dikbench.scenario.certificate import Certificate
-from dikbench.scenario.oracle import OracleMotion, follow
+from dikbench.scenario.held_frame import HeldFrame, held_frames
+from dikbench.scenario.oracle import OracleMotion, follow, solve_placement
+from dikbench.scenario.reference.embedded_path import EmbeddedPath, embedded_path
 from dikbench.scenario.reference.path import ReferencePath, reference_path
 from dikbench.scenario.reference.reference import Reference
+from dikbench.scenario.situation import Situation
 from dikbench.scenario.steps import steps_in
 from dikbench.scenario.variation import NO_VARIATION, Variation
+from dikbench.scenario.witness import Feasible, Witness
+
+REST_ROUNDING_S: Final = 1e-9
+"""A reference that moves is at its end when this nominal time remains."""
+
+Judged = Literal["path", "end"]
+"""What of a motion is judged: its whole way, or where it ends."""
 
 
 def first_level(tracking: TrackingTask, tasks: tuple[Task, ...]) -> TrackingTask:
@@ -39,13 +50,27 @@ class Scenario:
         reference: the desired motion of the task frame.
         tracking: the task that follows it: pose, position or orientation.
         dt: control period [s].
-        duration: length of a time-indexed run [s].
+        duration: length of a time-indexed run [s]; a reference that moves rests at its end until
+            then.
         certificate: the claims about its difficulty.
         tasks: other tasks, of lower or the same priority.
         motion: the joint motion from which the path was built, on which the certificate was
             measured, from q0 on; None where no joint motion follows the reference.
         variation: the ranges of what a seed perturbs.
         constraints: conditions in addition to the joint limits.
+        tolerance_m: distance from the path, and from the target at the end, up to which the task
+            counts as done [m] (see `Embedding`).
+        judged: whether the whole path is judged, or the end alone.
+        longest_path_run: nominal durations after which a path-indexed run ends, if not with its
+            path before.
+        feasible: what a motion is known for that keeps all limits.
+        witness: that motion; None where none is known.
+        infeasible_because: the proof that there is none, in words, where it is `no`; else empty.
+        followable_until: nominal time [s] at which the exact motion first breaks a position limit
+            or a distance, or where the reference leaves the reach; None where the reference can be
+            followed to its end.
+        comes_back: whether the end of the reference can be reached.
+        situation: what is difficult about it.
     """
 
     robot: Robot
@@ -60,6 +85,15 @@ class Scenario:
     motion: OracleMotion | None = None
     variation: Variation = NO_VARIATION
     constraints: tuple[Constraint, ...] = ()
+    tolerance_m: float = 0.005
+    judged: Judged = "path"
+    longest_path_run: float = 5.0
+    feasible: Feasible = "unknown"
+    witness: Witness | None = None
+    infeasible_because: str = ""
+    followable_until: float | None = None
+    comes_back: bool = True
+    situation: Situation = "free space"
 
     def __post_init__(self) -> None:
         """Check the number of control steps (see `steps_in`)."""
@@ -69,6 +103,11 @@ class Scenario:
     def steps(self) -> int:
         """Number of control steps of a time-indexed run."""
         return steps_in(self.duration, self.dt)
+
+    @property
+    def need(self) -> float:
+        """The largest joint speed of the exact motion over its limit; NaN where there is none."""
+        return float("nan") if self.motion is None else self.motion.peak_speed_ratio
 
     @cached_property
     def rows(self) -> tuple[int, ...]:
@@ -89,8 +128,19 @@ class Scenario:
         return [self.target(k * self.dt) for k in range(self.steps + 1)]
 
     def target(self, tau: float) -> tuple[Any, Any]:
-        """Compute placement and body twist of the reference at a nominal time [s]."""
-        return self.reference.placement(tau), pin.Motion(self.reference.velocity(tau))
+        """Compute placement and body twist of the reference at a nominal time [s].
+
+        At its end, and after it, a reference that moves is at rest. The last twist before leads to
+        the end in one control period, and not past it.
+        """
+        reference = self.reference
+        if not reference.moving:
+            return reference.placement(tau), pin.Motion(reference.velocity(tau))
+        left = reference.duration - tau
+        if left < REST_ROUNDING_S:
+            return reference.placement(reference.duration), pin.Motion.Zero()
+        share = min(1.0, left / self.dt)
+        return reference.placement(tau), pin.Motion(share * reference.velocity(tau))
 
     @cached_property
     def target_arrays(self) -> tuple[Array, Array]:
@@ -100,15 +150,55 @@ class Scenario:
 
     @cached_property
     def path(self) -> ReferencePath | None:
-        """The path of the reference, to the end of any run; None for a target at rest."""
+        """The path of the reference; None for a target at rest."""
+        reference = self.reference
+        return reference_path(reference, self.dt) if reference.moving else None
+
+    @cached_property
+    def embedding(self) -> Embedding:
+        """Maps placements of the task frame to points, by what is tracked of them."""
+        start = self.reference.placement(0.0).rotation
+        return embedding_of(self.tracking, self.robot, start)
+
+    @cached_property
+    def embedded_path(self) -> EmbeddedPath | None:
+        """The path of the reference in position and orientation; None for a target at rest."""
         if not self.reference.moving:
             return None
-        end = max(self.reference.duration, self.steps * self.dt)
-        return reference_path(self.reference, end, self.dt)
+        return embedded_path(self.reference, self.embedding, self.dt)
+
+    @property
+    def limits_torques(self) -> bool:
+        """Whether torque limits are a condition."""
+        return any(isinstance(each, TorqueConstraint) for each in self.constraints)
+
+    @cached_property
+    def held_frames(self) -> tuple[HeldFrame, ...]:
+        """The other frames whose tasks are of the priority of the tracking."""
+        return held_frames(self.robot, self.tracking, self.tasks)
+
+    def along(self, motion: OracleMotion, tau: float) -> Array:
+        """Compute the configuration of a joint motion at a nominal time [s], (nq,).
+
+        Between two samples it is the posture next to their mean that does the task.
+        """
+        if motion.exact is not None:
+            return motion.exact(tau)
+        k = min(int(np.searchsorted(motion.instants, tau, side="right")) - 1, len(motion.q) - 2)
+        begin, end = motion.instants[k : k + 2]
+        share = (tau - begin) / (end - begin)
+        between: Array = pin.interpolate(self.robot.model, motion.q[k], motion.q[k + 1], share)
+        if not self.reference.moving:
+            return between
+        target = self.reference.placement(tau)
+        return solve_placement(self.robot, target, between, tracking=self.first)
 
     @cached_property
     def oracle(self) -> Array | None:
         """The exact joint motion at every control step, (n + 1, nq); None where there is none.
+
+        Where it is not one that keeps position limits and distances, but another is known, it is
+        the other one.
 
         Raises:
             DikbenchError: if it cannot be followed at this control period.
@@ -116,6 +206,9 @@ class Scenario:
         if self.motion is None:
             return None
         instants = self.dt * np.arange(self.steps + 1, dtype=float)
-        if self.motion.exact is not None:
-            return np.array([self.motion.exact(tau) for tau in instants])
+        if self.reference.moving:
+            instants = np.minimum(instants, self.reference.duration)
+        motion = self.motion if self.witness is None else self.witness.motion
+        if motion.exact is not None or motion is not self.motion:
+            return np.array([self.along(motion, tau) for tau in instants])
         return follow(self.robot, self.reference, self.q0, instants, self.first)

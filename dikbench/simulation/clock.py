@@ -1,4 +1,4 @@
-"""Clocks: how a reference advances during a trial, with time or with the progress achieved."""
+"""Clocks: how a reference advances during a trial, with time or with the robot."""
 
 from __future__ import annotations
 
@@ -6,16 +6,15 @@ from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, Final, Literal, Protocol
 
-import numpy as np
+import pinocchio as pin
 
 from dikbench.arrays import Array
-from dikbench.problem.progress import progress, row_weights
 from dikbench.scenario.scenario import Scenario
 
 ReferenceMode = Literal["time", "path"]
 
-LONGEST_PATH_RUN_DURATIONS: Final = 5
-"""Nominal durations after which a path-indexed run ends, if not with its path before."""
+LOOK_BACK_S: Final = 0.1
+"""Nominal time before the target from which on the nearest point of the path is searched."""
 
 PATH_END_TOLERANCE: Final = 1e-9
 """Remaining share of a path at which it has ended."""
@@ -41,14 +40,8 @@ class Clock(Protocol):
         """Give the reference at each step."""
         ...
 
-    def advance(self, desired: Array, jacobian: Array, applied: Array) -> None:
-        """Advance after a control step.
-
-        Args:
-            desired: twist V of the tracking task, (m,) [m/s; rad/s].
-            jacobian: its Jacobian J, (m, nv).
-            applied: the velocity that the plant applied, (nv,) [rad/s or m/s].
-        """
+    def advance(self, q: Array) -> None:
+        """Advance after a control step that ended in the configuration q, (nq,)."""
         ...
 
 
@@ -64,40 +57,57 @@ class TimeClock:
         """Give the reference (see `Clock`), computed once for all trials of a scenario."""
         return iter(self._targets[: self.most_steps])
 
-    def advance(self, desired: Array, jacobian: Array, applied: Array) -> None:
+    def advance(self, q: Array) -> None:
         """Advance by one control period (see `Clock`)."""
         self._step += 1
         self.tau = self._step * self._dt
 
 
 class PathClock:
-    """Waits for the robot: advances by the share of the desired motion that was achieved.
+    """Waits for the robot: follows the nearest point of the path, at most at the nominal pace.
 
-    tau <- tau + dt min(max(alpha, 0), 1) with alpha = <J v, V>/|V|^2 (see `progress`); where no
-    motion is desired (a dwell) it moves on by dt. The trial is over when the path has ended, or
-    after `LONGEST_PATH_RUN_DURATIONS` times its nominal duration.
+        tau <- min(tau + dt, max(tau, tau_near + dt))
+
+    with tau_near the nominal time of the path's nearest point to the task frame after the step, in
+    position and orientation (see `Embedding`), in the window [tau - `LOOK_BACK_S`, tau + 2 dt]; the
+    latest of equally near ones. An exact motion advances at the nominal pace, and so does one that
+    is late by less than a control period; a dwell, whose points are all equally near, passes in
+    full. The trial is over when the path has ended, or after `Scenario.longest_path_run` times its
+    nominal duration.
     """
 
     def __init__(self, scenario: Scenario) -> None:
+        assert scenario.embedded_path is not None
         self.tau = 0.0
-        self.most_steps = LONGEST_PATH_RUN_DURATIONS * scenario.steps
         self._dt, self._target = scenario.dt, scenario.target
         self._duration = scenario.reference.duration
-        self._weights = row_weights(scenario.rows)
+        longest = scenario.longest_path_run * self._duration
+        self.most_steps = max(1, round(longest / self._dt))
+        self._path, self._embedding = scenario.embedded_path, scenario.embedding
+        self._frame, self._model = scenario.robot.frame_id, scenario.robot.model
+        self._data = self._model.createData()
 
     def __iter__(self) -> Iterator[tuple[Any, Any]]:
         """Give the reference (see `Clock`)."""
         for _ in range(self.most_steps):
-            if self.tau >= self._duration * (1 - PATH_END_TOLERANCE):
+            if path_has_ended(self.tau, self._duration):
                 break
             yield self._target(self.tau)
 
-    def advance(self, desired: Array, jacobian: Array, applied: Array) -> None:
-        """Advance by the progress achieved (see `Clock`)."""
-        achieved = jacobian @ applied
-        alpha = float(progress(desired[None], achieved[None], self._weights)[0])
-        share = 1.0 if np.isnan(alpha) else min(max(alpha, 0.0), 1.0)
-        self.tau = min(self.tau + self._dt * share, self._duration)
+    def advance(self, q: Array) -> None:
+        """Advance to where the robot is, at most by one control period (see `Clock`)."""
+        pin.forwardKinematics(self._model, self._data, q)
+        X = pin.updateFramePlacement(self._model, self._data, self._frame)
+        point = self._embedding.points(X.rotation[None], X.translation[None])[0]
+        first, last = self.tau - LOOK_BACK_S, self.tau + 2 * self._dt
+        near = self._path.latest_nearest(point, max(first, 0.0), min(last, self._duration))
+        ahead = min(self.tau + self._dt, max(self.tau, near + self._dt))
+        self.tau = min(ahead, self._duration)
+
+
+def path_has_ended(tau: float, duration: float) -> bool:
+    """Return whether a nominal time [s] is the end of a path of this nominal duration [s]."""
+    return tau >= duration * (1 - PATH_END_TOLERANCE)
 
 
 CLOCKS: Final[Mapping[ReferenceMode, type[Clock]]] = MappingProxyType(

@@ -15,7 +15,7 @@ from dikbench.problem.posing import pose_problem
 from dikbench.problem.problem import Formulation
 from dikbench.problem.progress import STUCK_PROGRESS, progress, row_weights
 from dikbench.robots.kinematics import Kinematics
-from dikbench.scenario.plant import Plant
+from dikbench.scenario.plant import Plant, ProtectiveStop, Step
 from dikbench.scenario.scenario import Scenario
 from dikbench.simulation.clock import CLOCKS, ReferenceMode
 from dikbench.simulation.control_step import TrialEnded, control_step
@@ -76,7 +76,7 @@ def simulate(
         formulation: the formulation under test.
         solve: its solver.
         plant: the measurement and the drive.
-        mode: whether the reference advances with the clock or with the progress achieved.
+        mode: whether the reference advances with the clock or waits for the robot.
         seed: seed of the plant's noise.
 
     Returns:
@@ -118,16 +118,25 @@ def simulate(
             steps.append(
                 (q, clock.tau, desired, jacobian, v, applied, answer.status, problem.relaxed)
             )
-            clock.advance(desired, jacobian, applied)
-            q, v_prev = read_only(pin.integrate(model, q, applied * dt)), applied
+            before, q = q, read_only(pin.integrate(model, q, applied * dt))
+            clock.advance(q)
+            started.watch(Step(k + 1, before, q, v_prev, applied))
+            v_prev = applied
     except TrialEnded as ended:
         status, message = ended.status, f"step {len(steps)}: {ended}"
-    trace, jacobians = _recorded(scenario, steps, q, clock.tau, solve.rechecked())
+    except ProtectiveStop as stop:
+        status, message = Status.PROTECTIVE_STOP, f"step {len(steps) - 1}: {stop}"
+    trace, jacobians = _recorded(scenario, steps, q, clock.tau, solve.rechecked(), mode)
     return Run(trace, status, message, kinematics_ns, formulation_ns, jacobians)
 
 
 def _recorded(
-    scenario: Scenario, steps: list[_Step], q: Array, tau: float, rechecked: RecheckedSteps
+    scenario: Scenario,
+    steps: list[_Step],
+    q: Array,
+    tau: float,
+    rechecked: RecheckedSteps,
+    mode: ReferenceMode,
 ) -> tuple[Trace, Array]:
     """Make the trace and the Jacobians (n, m, nv) of steps that ended in q at tau.
 
@@ -159,6 +168,7 @@ def _recorded(
         rechecked.dual[:n],
         rechecked.gap[:n],
         rechecked.distance[:n],
+        mode,
     )
     return trace, jacobians
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from time import perf_counter_ns
 
 import msgspec
@@ -9,10 +10,14 @@ import numpy as np
 
 from dikbench.arrays import Array
 from dikbench.errors import CannotAnswer, Infeasible, in_words
+from dikbench.linear_algebra import shortest
 from dikbench.problem.problem import DikProblem, Formulation
 from dikbench.problem.velocity_box import velocity_box
 from dikbench.simulation.status import Status
 from dikbench.solvers.checked_solve import CheckedSolve
+
+KEPT_RAD_S = 1e-9
+"""A row of G v <= h that is passed by less than this [rad/s] is kept."""
 
 FLOATS = np.dtype(float)
 
@@ -48,9 +53,10 @@ def control_step(
     """Ask the formulation for the velocity of one step of a run.
 
     Raises:
-        TrialEnded: if the formulation raises another error than `CannotAnswer`, or does not return
-            a finite vector (nv,) of real numbers.
+        TrialEnded: if the problem is not finite, if the formulation raises another error than
+            `CannotAnswer`, or does not return a finite vector (nv,) of real numbers.
     """
+    _check_finite(problem)
     solve.begin_step(step)
     start = perf_counter_ns()
     try:
@@ -66,6 +72,33 @@ def control_step(
         raise TrialEnded(Status.FORMULATION_ERROR, in_words(error)) from error
     formulation_ns = perf_counter_ns() - start - solve.checking_ns
     return StepAnswer(v, Status.OK, formulation_ns, _square(v, problem.robot.nv))
+
+
+def _check_finite(problem: DikProblem) -> None:
+    """Check that the problem holds numbers alone (h may be infinite): else zeros pass for answers.
+
+    One sum tells almost always, and costs a fifth of asking every entry.
+    """
+    q, v_prev, G, h = problem.q, problem.v_prev, problem.G, problem.h
+    total = float(q.dot(q))  # numpy's own numbers would warn of infinity
+    if v_prev is not None:
+        total += float(v_prev.dot(v_prev))
+    for task in problem.tasks:
+        J, V = task.J, task.V
+        total += float(np.vdot(J, J)) + float(V.dot(V)) + float(V.dot(task.error))
+    if G is not None and h is not None:
+        total += float(np.vdot(G, G)) + (np.nan if np.isnan(h).any() else 0.0)
+    if isfinite(total):
+        return
+    parts = {"q": q, "v_prev": v_prev, "G": G, "h": None if h is None else np.minimum(h, 0.0)}
+    for number, task in enumerate(problem.tasks, start=1):
+        for name in ("J", "V", "error"):
+            parts[f"{name} of task {number}"] = getattr(task, name)
+    wrong = [n for n, part in parts.items() if part is not None and not np.isfinite(part).all()]
+    if wrong:
+        raise TrialEnded(
+            Status.NOT_FINITE, f"the problem holds NaN or infinity: {', '.join(wrong)}"
+        )
 
 
 def _square(v: object, nv: int) -> float:
@@ -90,17 +123,29 @@ def _check_velocity(v: object, nv: int) -> None:
 def fallback(problem: DikProblem) -> Array:
     """Slow down uniformly: v = c v_prev, clipped to the velocity box.
 
-    c is the smallest factor in [0, 1] that the acceleration limits allow,
-    1 - min_i a_i dt / |v_prev,i|, and the rows G v <= h (torques that brake are limited too).
+    c is the smallest factor in [0, 1] that neither an acceleration limit of a joint forbids,
+    1 - min_i a_i dt / |v_prev,i|, nor a row of G v <= h (torques that brake are limited too).
     Without either, or without v_prev, the robot stops at once; outside a position limit the box
-    leads it back inside.
+    leads it back inside. Where that breaks a row, the nearest velocity in the box that keeps all
+    rows is taken; where there is none, the joint limits are kept and rows are broken.
     """
     # Not `problem.box`, which records relaxed bounds as the formulation's.
     box = velocity_box(problem.limits, problem.v_prev, problem.dt)
     v = np.zeros(problem.robot.nv)
     if problem.v_prev is not None:
         v = _slowest(problem, problem.v_prev) * problem.v_prev
-    return np.clip(v, box.lower, box.upper)
+    v = np.clip(v, box.lower, box.upper)
+    G, h = problem.G, problem.h
+    if G is None or h is None or (G @ v <= h + KEPT_RAD_S).all():
+        return v
+    identity = np.eye(len(v))
+    rows, sides = np.vstack([G, identity, -identity]), np.concatenate([h, box.upper, -box.lower])
+    bounded = sides < np.inf
+    move = shortest(rows[bounded], (sides - rows @ v)[bounded])
+    if move is None:
+        return v
+    nearest: Array = np.clip(v + move, box.lower, box.upper)
+    return nearest
 
 
 def _slowest(problem: DikProblem, v_prev: Array) -> float:

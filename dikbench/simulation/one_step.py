@@ -15,7 +15,7 @@ from dikbench.errors import DikbenchError, unknown
 from dikbench.plugins.building import make_formulation
 from dikbench.problem.constraints import Constraint
 from dikbench.problem.posing import pose_problem
-from dikbench.problem.problem import Formulation, program_of
+from dikbench.problem.problem import Formulation, program_of, refusal_of
 from dikbench.problem.progress import STUCK_PROGRESS, progress, row_weights
 from dikbench.problem.tasks import LinearizedTask, PoseTask, Task
 from dikbench.robots.kinematics import Kinematics
@@ -77,15 +77,15 @@ def solve_dik(
         reference_frame: the axes in which the twist is given, Pinocchio's names.
         gain: gain on the target's error [1/s]; default: 1/dt, which reaches it in one step.
         dt: control period [s].
-        solver: a solver's selector, such as `osqp[eps_abs=1e-6]`; default: daqp, or clarabel for a
-            formulation written in cvxpy. Not used by formulations that need none.
+        solver: a solver's selector, such as `osqp[eps_abs=1e-6]`; default: daqp[then=clarabel],
+            or clarabel for a formulation written in cvxpy. Not used by formulations that need none.
         v_prev: velocity applied in the previous step, (nv,); None: no acceleration bound.
         tasks: secondary tasks.
         constraints: conditions in addition to the joint limits.
 
     Raises:
-        DikbenchError: on a wrong name, shape or value, or a formulation that raises an error or
-            returns a wrong shape or NaN.
+        DikbenchError: on a wrong name, shape or value, or a formulation that refuses such a
+            problem, raises an error or returns a wrong shape or NaN.
     """
     if not isinstance(robot, Robot):
         raise DikbenchError(
@@ -116,6 +116,9 @@ def solve_dik(
     else:
         main = _target_task(kinematics, target, 1 / dt if gain is None else gain)
     problem = pose_problem(kinematics, previous, dt, main, tasks, constraints)
+    reason = refusal_of(formulation, problem)
+    if reason:
+        raise DikbenchError(f"formulation {type(formulation).__name__}: {reason}")
     solve = _solve_for(formulation, solver)
     try:
         answer = control_step(formulation, problem, solve)

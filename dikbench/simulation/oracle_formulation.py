@@ -8,8 +8,10 @@ from dataclasses import dataclass
 import pinocchio as pin
 
 from dikbench.arrays import Array
-from dikbench.problem.problem import DikProblem, Solve
+from dikbench.problem.problem import DikProblem, Formulation, Solve
+from dikbench.scenario.oracle import ORACLE
 from dikbench.scenario.scenario import Scenario
+from dikbench.simulation.slowed_oracle import SlowedOracle
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,3 +35,10 @@ class OracleFormulation:
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """Command the next velocity."""
         return next(self.velocities)
+
+
+def oracle_of(name: str, scenario: Scenario) -> Formulation | None:
+    """Make the oracle of a scenario by its name in `ORACLES`; None where no motion is known."""
+    if name == ORACLE:
+        return None if scenario.oracle is None else OracleFormulation.of(scenario)
+    return None if scenario.witness is None else SlowedOracle(scenario)

@@ -32,12 +32,16 @@ class Status(Enum):
         "The solver claimed success, the recomputed residuals say otherwise.",
     )
     DIVERGED = ("diverged", "The motion left all bounds; the trial was ended.")
+    PROTECTIVE_STOP = (
+        "protective-stop",
+        "The plant stopped the robot at the first limit or distance that was broken.",
+    )
     FORMULATION_ERROR = (
         "formulation-error",
         "The formulation raised an error that is not an answer.",
     )
     WRONG_SHAPE = ("wrong-shape", "The formulation did not return a vector of nv numbers.")
-    NOT_FINITE = ("not-finite", "The formulation returned NaN or infinity.")
+    NOT_FINITE = ("not-finite", "The formulation was given or returned NaN or infinity.")
     TIMEOUT = (
         "timeout",
         "The trial ran out of wall-clock time; lower its size or raise the limit.",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import pyarrow as pa
 
 from dikbench.arrays import Array, Indices
 from dikbench.errors import DikbenchError
+from dikbench.simulation.clock import ReferenceMode
 from dikbench.simulation.status import STEP_CODE, Status
 
 
@@ -31,6 +33,7 @@ class Trace:
             or 0; -1 where nothing was solved, (n,) each (see `RecheckedSteps`).
         primal, dual, gap: largest residuals of the step's programs, (n,) (see `Residuals`).
         distance: largest distance of an answer from the optimum, (n,) [rad/s].
+        mode: whether the reference advanced with the clock or with the robot along its path.
     """
 
     dt: float
@@ -47,6 +50,7 @@ class Trace:
     dual: Array
     gap: Array
     distance: Array
+    mode: ReferenceMode = "time"
 
     @property
     def steps(self) -> int:
@@ -67,9 +71,9 @@ class Trace:
         columns = {
             field.name: _column(getattr(self, field.name), self.steps + 1)
             for field in fields(self)
-            if field.name != "dt"
+            if field.name in _COLUMNS
         }
-        table = pa.table(columns, metadata={"dt": repr(self.dt)})
+        table = pa.table(columns, metadata={"dt": repr(self.dt), "mode": self.mode})
         options = pa.ipc.IpcWriteOptions(compression="lz4")
         with pa.ipc.new_file(str(path), table.schema, options=options) as file:
             file.write_table(table)
@@ -86,16 +90,27 @@ class Trace:
                 table = file.read_all()
             arrays: dict[str, Any] = {name: _array(table.column(name)) for name in _COLUMNS}
             dt = float(table.schema.metadata[b"dt"])
+            mode = _mode(table.schema.metadata, arrays["tau"], dt)
         except (OSError, KeyError, TypeError, ValueError) as error:  # with Arrow's own errors
             reason = " ".join(str(error).split())
             raise DikbenchError(f"trace {path}: not a trace of dikbench: {reason}") from None
         n = len(arrays["q"]) - 1
         for name in arrays.keys() - {"q", "tau"}:
             arrays[name] = arrays[name][:n]
-        return cls(dt=dt, **arrays)
+        return cls(dt=dt, mode=mode, **arrays)
 
 
-_COLUMNS = tuple(field.name for field in fields(Trace) if field.name != "dt")
+_COLUMNS = tuple(field.name for field in fields(Trace) if field.name not in {"dt", "mode"})
+
+
+def _mode(metadata: Mapping[bytes, bytes], tau: Array, dt: float) -> ReferenceMode:
+    """What moved the reference on; a trace of version 0.1 does not say, but its tau does."""
+    written = metadata.get(b"mode")
+    if written is None:
+        by_clock = np.array_equal(tau, dt * np.arange(len(tau)))
+    else:
+        by_clock = written == b"time"
+    return "time" if by_clock else "path"
 
 
 def _column(values: Array | Indices, rows: int) -> Any:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from time import perf_counter_ns
 from typing import Any, Final
 
+import msgspec
 import numpy as np
 
 from dikbench.arrays import Array
@@ -15,7 +16,7 @@ from dikbench.programs.modelled_program import ModelledProgram
 from dikbench.programs.quadratic_program import ProgramKind, QuadraticProgram
 from dikbench.solvers.catalogue.back_ends import Solver
 from dikbench.solvers.catalogue.presets import TOLERANCES
-from dikbench.solvers.recheck.feasibility import is_feasible
+from dikbench.solvers.recheck.feasibility import is_feasible, is_finite
 from dikbench.solvers.recheck.rechecked import RecheckedSteps, Solved
 
 ANSWERS_PER_RECHECK: Final = 512
@@ -105,6 +106,8 @@ class CheckedSolve:
     def _reason(self, program: QuadraticProgram | ModelledProgram) -> Infeasible | SolverFailed:
         """Decide why there is no answer; the timing pass does not ask."""
         matrices = program.matrices() if isinstance(program, ModelledProgram) else program
+        if not is_finite(matrices):
+            return SolverFailed("the program holds NaN or infinity")
         if not self._checks or is_feasible(matrices):
             return SolverFailed("the solver gave no answer to a feasible program")
         return Infeasible("the program has no feasible point")
@@ -138,17 +141,41 @@ def make_solve(
     """
     if solver is None or program is None:
         return NoSolve()
-    back_end: BackEnd
+    back_end = _back_end(solver, program)
+    if solver.then is not None:
+        back_end = _InTurn(back_end, _back_end(solver.then, program))
+    return CheckedSolve(back_end, tolerance=solver.tolerance, checks=checks)
+
+
+def _back_end(solver: Solver, program: ProgramKind) -> BackEnd:
     if program == "cvxpy" or solver.interface == "cvxpy":
         from dikbench.solvers.interfaces.through_cvxpy import ModelledSolver
 
-        back_end = ModelledSolver(solver)
-    elif solver.interface == "warm":
+        return ModelledSolver(solver)
+    if solver.interface == "warm":
         from dikbench.solvers.interfaces.warm import WarmSolver
 
-        back_end = WarmSolver(solver)
-    else:
-        from dikbench.solvers.interfaces.cold import ColdSolver
+        return WarmSolver(solver)
+    from dikbench.solvers.interfaces.cold import ColdSolver
 
-        back_end = ColdSolver(solver)
-    return CheckedSolve(back_end, tolerance=solver.tolerance, checks=checks)
+    return ColdSolver(solver)
+
+
+class _InTurn:
+    """Two back ends: the second one is asked where the first gives no answer."""
+
+    __slots__ = ("_first", "_second")
+
+    def __init__(self, first: BackEnd, second: BackEnd) -> None:
+        self._first = first
+        self._second = second
+
+    def __call__(self, program: Any, site: int) -> Answer:
+        """Solve a program; the core time is that of all who were asked."""
+        first = self._first(program, site)
+        x = first.x
+        if first.claimed and x is not None and x.dot(x) < np.inf:
+            return first
+        second = self._second(program, site)
+        core_ns = first.core_ns + second.core_ns
+        return msgspec.structs.replace(second, core_ns=core_ns)

@@ -11,9 +11,9 @@ from typing import Any
 from dikbench.plugins.building import make_formulation, make_plant, scenario_parameters
 from dikbench.plugins.finding import formulation_plugin, scenario_plugin
 from dikbench.plugins.source import digest, digest_of_file, source_digest
-from dikbench.scenario.oracle import ORACLE
+from dikbench.scenario.oracle import ORACLES
 from dikbench.selector import Selector
-from dikbench.solvers.catalogue.back_ends import parse_solver
+from dikbench.solvers.catalogue.back_ends import Solver, parse_solver
 from dikbench.study.trial import NO_SOLVER, Trial
 
 
@@ -40,8 +40,8 @@ def timing_id(formulation: Selector, solver: Selector, scenario: Selector) -> st
 
 @lru_cache(maxsize=4096)
 def _formulation(selector: Selector) -> str:
-    if selector.name == ORACLE:
-        return ORACLE
+    if selector.name in ORACLES:
+        return selector.name
     made = make_formulation(selector)
     plugin = formulation_plugin(selector.name)
     names: list[str] = [field.name for field in fields(made)] if is_dataclass(made) else []
@@ -64,10 +64,13 @@ def _solver(selector: Selector) -> str:
     if selector == NO_SOLVER:
         return selector.name
     solver = parse_solver(selector)
-    settings: dict[str, Any] = {key: repr(value) for key, value in solver.settings.items()}
-    return digest(
-        json.dumps([solver.name, solver.interface, settings, solver.tolerance], sort_keys=True)
-    )
+    return digest(json.dumps(_described_solver(solver), sort_keys=True))
+
+
+def _described_solver(solver: Solver) -> list[Any]:
+    settings = {key: repr(value) for key, value in solver.settings.items()}
+    then = [] if solver.then is None else [_described_solver(solver.then)]
+    return [solver.name, solver.interface, settings, solver.tolerance, *then]
 
 
 def _described(value: Any) -> str:

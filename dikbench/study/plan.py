@@ -16,7 +16,7 @@ from dikbench.plugins.building import (
     scenario_parameters,
 )
 from dikbench.problem.problem import program_of
-from dikbench.scenario.oracle import ORACLE
+from dikbench.scenario.oracle import ORACLE, ORACLES
 from dikbench.selector import Selector, parse_selector
 from dikbench.solvers.catalogue.back_ends import parse_solver, why_not
 from dikbench.study.identity import trial_id
@@ -63,10 +63,10 @@ def expand(study: Study) -> list[PlannedTrial]:
     planned: dict[str, PlannedTrial] = {}
     for cells in study.cells:
         for formulation in map(parse_selector, cells.formulations):
-            is_oracle = formulation.name == ORACLE
-            # The oracle has no feedback, so plants and reference modes make no difference.
-            plants = [IDEAL_PLANT] if is_oracle else all_plants
-            references = ("time",) if is_oracle else study.references
+            # Oracles have no feedback: plants make no difference, and to a motion at its nominal
+            # speed reference modes make none.
+            plants = [IDEAL_PLANT] if formulation.name in ORACLES else all_plants
+            references = ("time",) if formulation.name == ORACLE else study.references
             for solver, skip in _solvers_for(study, formulation, cells.solvers):
                 for scenario, plant, reference, seed in itertools.product(
                     scenarios, plants, references, study.seeds
@@ -88,7 +88,7 @@ def _check_timing(study: Study) -> None:
     if study.timing is None:
         return
     reference = parse_selector(study.timing.reference)
-    if reference.name == ORACLE or program_of(make_formulation(reference)):
+    if reference.name in ORACLES or program_of(make_formulation(reference)):
         raise DikbenchError(
             f"study {study.name}: timing.reference {str(reference)!r} must be a formulation that "
             "needs no solver, such as 'dls'"
@@ -99,7 +99,7 @@ def _solvers_for(
     study: Study, formulation: Selector, solvers: Sequence[str]
 ) -> list[tuple[Selector, str]]:
     """Return the solvers with which a formulation runs, each with the reason if it cannot."""
-    program = None if formulation.name == ORACLE else program_of(make_formulation(formulation))
+    program = None if formulation.name in ORACLES else program_of(make_formulation(formulation))
     parsed = [(parse_selector(text), parse_solver(text)) for text in solvers]
     if program is None:
         return [(NO_SOLVER, "")]

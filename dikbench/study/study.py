@@ -19,7 +19,7 @@ from dikbench.plugins.building import (
 )
 from dikbench.problem.problem import program_of
 from dikbench.programs.quadratic_program import ProgramKind
-from dikbench.scenario.oracle import ORACLE
+from dikbench.scenario.oracle import ORACLES
 from dikbench.scenario.plant import REFERENCE_MODES
 from dikbench.selector import Selector, alternatives, parse_selector
 from dikbench.solvers.catalogue.back_ends import (
@@ -262,7 +262,7 @@ def _cells_for(base: Study, formulation: Selector, named: bool) -> Cells:
 
 
 def _program_of(formulation: str | Selector) -> ProgramKind | None:
-    """Return what a formulation needs a solver for; the oracle needs none."""
-    if parse_selector(formulation).name == ORACLE:
+    """Return what a formulation needs a solver for; the oracles need none."""
+    if parse_selector(formulation).name in ORACLES:
         return None
     return program_of(make_formulation(formulation))

@@ -37,6 +37,7 @@ from dikbench.testing.family import (
     check_family_ranges,
     check_family_seeds,
 )
+from dikbench.testing.sight import check_sight
 from dikbench.testing.states import State, states
 
 __all__ = [
@@ -67,6 +68,7 @@ __all__ = [
     "check_raises_only_cannot_answer",
     "check_repeatable",
     "check_shape",
+    "check_sight",
     "check_state",
     "check_velocity_limits",
     "states",

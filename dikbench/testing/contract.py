@@ -22,10 +22,19 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.arrays import Array
-from dikbench.problem.problem import DikProblem, Formulation, LimitKind, program_of, promises_of
+from dikbench.problem.problem import (
+    DikProblem,
+    Formulation,
+    LimitKind,
+    ProblemPart,
+    program_of,
+    promises_of,
+    sight_of,
+)
 from dikbench.programs.quadratic_program import ProgramKind
 from dikbench.simulation.status import Status
 from dikbench.testing.asked import LIMIT_TOLERANCE_RAD_S, Asked, asked_of
+from dikbench.testing.sight import check_sight
 from dikbench.testing.states import State, states
 
 Check = Callable[[Formulation | Asked, str | None], None]
@@ -45,6 +54,10 @@ def check_declaration(formulation: Formulation | Asked, solver: str | None = Non
     if wrong:
         valid = ", ".join(get_args(LimitKind))
         raise AssertionError(f"{name}.keeps holds {sorted(wrong)}; valid: {valid}")
+    strange = sight_of(formulation) - set(get_args(ProblemPart))
+    if strange:
+        valid = ", ".join(get_args(ProblemPart))
+        raise AssertionError(f"{name}.sees holds {sorted(strange)}; valid: {valid}")
 
 
 def check_raises_only_cannot_answer(
@@ -237,6 +250,7 @@ def check_state(formulation: Formulation, state: State, solver: str | None = Non
 
 CHECKS: Final[tuple[Check, ...]] = (
     check_declaration,
+    check_sight,
     check_raises_only_cannot_answer,
     check_shape,
     check_finite,

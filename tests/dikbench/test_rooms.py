@@ -29,6 +29,7 @@ ROOMS: Final = (
     "results",
     "run",
     "report",
+    "invariants",
     "viewer",
     "cli",
 )

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from dikbench.metrics import METRICS
-from dikbench.results.columns import CONTROL_RATES_HZ, KEYS, SELECTORS, TIMES
+from dikbench.results.columns import CONTROL_RATES_HZ, KEYS, SEES, SELECTORS, TIMES
 from dikbench.results.selected import selected_columns, with_selected
 
 Values = Mapping[str, Any]
@@ -27,6 +27,7 @@ FAULTLESS: Final[Values] = {
     "claimed_share": float("nan"),
     "verified_share": float("nan"),
     "disagreed_share": float("nan"),
+    **dict.fromkeys(SEES, float("nan")),
     "wall_time_s": 0.1,
     "control_time_s": 0.05,
     "environment": "e",
@@ -104,9 +105,8 @@ def random_rows(
     }
     table = table.assign(**drawn | {"timing_samples": 100, "timing_stability": "stable"})
     table["progress_mean"] = table["progress_min"] = 1.0 - table["progress_mean"].clip(upper=1.0)
-    return with_selected(
-        table.assign(**{f"missed_{rate}_hz_share": 0.0 for rate in CONTROL_RATES_HZ})
-    )
+    missed = {f"missed_{rate}_hz_share": 0.0 for rate in CONTROL_RATES_HZ}
+    return with_selected(table.assign(**missed).copy())  # in one block
 
 
 def bare_rows(**columns: Sequence[object]) -> pd.DataFrame:

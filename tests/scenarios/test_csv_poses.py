@@ -29,7 +29,7 @@ def test_the_example_is_followed_from_its_first_row_to_its_last(robot: str) -> N
     """Every row is passed at its time, and the oracle is there too."""
     scenario = make_scenario(f"csv[robot={robot},file={TRIANGLE}]")
     rows = _rows(TRIANGLE)
-    assert scenario.duration == rows[-1, 0]
+    assert scenario.reference.duration == rows[-1, 0]
     for row in rows:
         X = scenario.reference.placement(row[0])
         assert X.translation == pytest.approx(row[1:4])
@@ -72,11 +72,11 @@ def test_a_seed_changes_the_pace_only() -> None:
     plain = make_scenario(f"csv[file={TRIANGLE}]")
     for seed in (1, 2, 3):
         other = make_scenario(f"csv[file={TRIANGLE}]", seed)
-        assert 0.9 <= other.duration / plain.duration <= 1.1
-        assert other.duration != plain.duration
+        assert 0.9 <= other.reference.duration / plain.reference.duration <= 1.1
+        assert other.reference.duration != plain.reference.duration
         assert np.array_equal(other.q0, plain.q0)
         for share in (0.2, 0.55, 0.9):
-            a, b = (s.reference.placement(share * s.duration) for s in (plain, other))
+            a, b = (s.reference.placement(share * s.reference.duration) for s in (plain, other))
             assert a.homogeneous == pytest.approx(b.homogeneous)
 
 

@@ -41,7 +41,9 @@ def _deviation(motion: Motion, weights: Array) -> float:
 
 
 def _progress(motion: Motion) -> Array:
-    alpha = progress(motion.trace.wanted, motion.achieved, LENGTH)
+    """Progress while the reference moves."""
+    moving = round(motion.scenario.reference.duration / motion.scenario.dt)
+    alpha = progress(motion.trace.wanted, motion.achieved, LENGTH)[:moving]
     return alpha[~np.isnan(alpha)]
 
 

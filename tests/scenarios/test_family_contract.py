@@ -66,7 +66,8 @@ class BreaksAtAnEnd(Honest):
 
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """See `Family`."""
-        return replace(super().case(robot, change), duration=1 / self.slowness)
+        v0 = np.zeros(robot.nv) + 0.0 * (1 / self.slowness)
+        return replace(super().case(robot, change), v0=v0)
 
 
 @dataclass(frozen=True, kw_only=True)

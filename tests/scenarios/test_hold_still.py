@@ -77,8 +77,8 @@ def test_noise_next_to_a_limit_sends_laws_that_know_it_off_course() -> None:
     """The joint seems to be outside and is told to come back; a law without limits stays calm."""
     scenario = make_scenario("hold-still[posture=limit]")
     blind, knowing = metrics_of("pinv", scenario, NOISY), metrics_of("qp", scenario, NOISY)
-    assert blind["off_course_max_rad"] < 0.05
-    assert knowing["off_course_max_rad"] > 1
+    assert blind["direction_error_max_rad"] < 0.05
+    assert knowing["direction_error_max_rad"] > 1
     assert knowing["velocity_peak_ratio"] > 2 * blind["velocity_peak_ratio"]
 
 

@@ -120,7 +120,7 @@ def test_speed_scales_the_motion(robot: str, name: str) -> None:
     slow, fast = (
         make_scenario(_selector(robot, name, 0.01, f",speed={speed}")) for speed in (0.2, 0.4)
     )
-    assert slow.duration == pytest.approx(2 * fast.duration)
+    assert slow.reference.duration == pytest.approx(2 * fast.reference.duration)
     assert _motion(slow).q == pytest.approx(_motion(fast).q, abs=1e-9)
     ratio = _motion(fast).peak_speed_ratio / _motion(slow).peak_speed_ratio
     assert ratio == pytest.approx(2.0)
@@ -132,7 +132,7 @@ def test_a_seed_changes_start_and_timing_within_the_ranges() -> None:
     for seed in range(1, 6):
         other = make_scenario(_selector("ur5", "wrist", 0.01), seed)
         assert 0 < np.abs(other.q0 - plain.q0).max() < 0.25
-        assert 0 < abs(other.duration / plain.duration - 1) <= 0.1 + 1e-9
+        assert 0 < abs(other.reference.duration / plain.reference.duration - 1) <= 0.1 + 1e-9
         middle = _motion(other).sigma_min.min()
         assert middle == pytest.approx(_motion(plain).sigma_min.min(), rel=0.3)
 

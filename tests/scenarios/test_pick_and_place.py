@@ -22,7 +22,7 @@ def test_the_object_is_lifted_carried_across_turned_and_put_down() -> None:
     """By the lengths and the angle given, about the start, which is left and not met again."""
     scenario = make_scenario("pick-and-place[robot=ur5,width=0.24,height=0.08,turn=0.6]")
     at = scenario.reference.placement
-    T = scenario.duration
+    T = scenario.reference.duration
     start, grasp, lifted, carried, placed = (
         at(share * T) for share in (0.0, GRASP, LIFTED, CARRIED, PLACED)
     )

@@ -81,8 +81,8 @@ def test_clipping_goes_off_course_and_scaling_does_not() -> None:
     )
     assert free["velocity_violation_max_rad_s"] > 0.5
     assert clipped["velocity_violation_max_rad_s"] < 1e-9
-    assert clipped["off_course_max_rad"] > 0.1
-    assert scaled["off_course_max_rad"] < 1e-6
+    assert clipped["direction_error_max_rad"] > 0.1
+    assert scaled["direction_error_max_rad"] < 1e-6
     for seen in (free, clipped, scaled):
         assert seen["position_error_final_m"] < 1e-6
         assert seen["orientation_error_final_rad"] < 1e-6

@@ -23,6 +23,8 @@ from dikbench.report.sentences.summary import Summary, summarise
 from dikbench.report.tables.build import make_table
 from dikbench.report.tables.kinds import KINDS
 from dikbench.report.tables.return_codes import return_codes
+from dikbench.report.tables.solver_axis import solver_axis
+from dikbench.report.tables.success import success_table
 from dikbench.report.tables.table import Table
 from dikbench.results.reading import Results
 
@@ -34,7 +36,7 @@ class Contents:
     Attributes:
         results: what it is about.
         summary: what a person reads first.
-        tables: tracking error, limit violation, timing.
+        tables: success, tracking error, limit violation, timing, solvers.
         return_codes: a row per solver.
         families: the scenario families of the run.
         formulations: its formulations.
@@ -126,7 +128,11 @@ def gather(results: Results, figures: Sequence[Figure]) -> Contents:
     return Contents(
         results,
         summarise(trials),
-        [make_table(kind, measured) for kind in KINDS],
+        [
+            success_table(trials),
+            *(make_table(kind, measured) for kind in KINDS),
+            solver_axis(trials),
+        ],
         return_codes(trials),
         families_of(trials),
         formulations_of(trials),

@@ -16,7 +16,7 @@ from dikbench.report.contents.bibliography import references
 from dikbench.report.contents.docstring import Docstring, parse_docstring
 from dikbench.results.columns import SELECTORS
 from dikbench.results.selected import parameters_of
-from dikbench.scenario.oracle import ORACLE
+from dikbench.scenario.oracle import ORACLES, SLOWED_ORACLE
 
 MOST_CERTIFICATES: Final = 40
 """Scenarios of a family whose certificates are shown."""
@@ -98,7 +98,7 @@ def formulations_of(trials: pd.DataFrame) -> list[FormulationOfRun]:
     parameters = parameters_of(trials, "formulation")
     found = []
     for name, selectors in sorted(
-        _by_name(trials, "formulation").items(), key=lambda item: item[0] == ORACLE
+        _by_name(trials, "formulation").items(), key=lambda item: item[0] in ORACLES
     ):
         text, defaults, file = _described(name)
         variants = tuple(
@@ -127,12 +127,10 @@ def _described(name: str) -> tuple[str | None, dict[str, str], Path | None]:
     A formulation that is given as a file is read and not executed: results are data, and remaking
     their report must not run what they name.
     """
-    if name == ORACLE:
-        return (
-            "The joint motion from which a scenario's path was built, scored like a formulation.",
-            {},
-            None,
-        )
+    if name in ORACLES:
+        slowed = ", slowed down until it keeps all limits" if name == SLOWED_ORACLE else ""
+        what = "The joint motion from which a scenario's path was built"
+        return f"{what}{slowed}, scored like a formulation.", {}, None
     if in_file(name):
         return *_read(name), None
     plugin = plugins("formulation").get(name)

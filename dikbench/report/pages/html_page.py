@@ -107,6 +107,8 @@ def render_html(contents: Contents, figures: Path) -> str:
 
 def _td(cell: TableCell, column: Column) -> Markup:
     """A number in its cell; it is sorted by `data-sort` where its text is more than the number."""
+    if cell.text:
+        return Markup('<td class="told" data-sort="-1">{}</td>').format(cell.text)
     if isnan(cell.value):
         return Markup("<td></td>")
     number = str(int(cell.value)) if column.count else shown(cell.value)

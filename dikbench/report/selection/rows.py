@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from dikbench.report.drawing.style import contender_name
-from dikbench.scenario.oracle import ORACLE
+from dikbench.scenario.oracle import ORACLES
 
 LEAST_ERROR = 1e-5
 """Nothing below this [m] is drawn: the axes are logarithmic."""
@@ -25,6 +25,18 @@ def that_ran(trials: pd.DataFrame) -> pd.DataFrame:
         contender_name(f, s) for f, s in zip(ran["formulation"], ran["solver"], strict=True)
     ]
     return ran
+
+
+def names_of_contenders(rows: pd.DataFrame) -> dict[tuple[str, str], str]:
+    """Return how formulations with their solvers are called; alone where there is one solver."""
+    pairs = rows[["formulation", "solver"]].drop_duplicates()
+    solvers = pairs["formulation"].value_counts()
+    return {
+        (formulation, solver): (
+            contender_name(formulation, solver) if solvers[formulation] > 1 else formulation
+        )
+        for formulation, solver in pairs.itertuples(index=False, name=None)
+    }
 
 
 def one_solver_each(ran: pd.DataFrame) -> pd.DataFrame:
@@ -74,7 +86,7 @@ def ranked(rows: pd.DataFrame, column: str) -> list[str]:
     worth = rows.assign(worth=failures_at_infinity(rows, column))
     medians = worth.groupby("formulation", sort=False)["worth"].median()
     order = medians.sort_values(kind="stable", na_position="last").index
-    return sorted(order, key=lambda name: name != ORACLE)
+    return sorted(order, key=lambda name: name not in ORACLES)
 
 
 def pages(names: Sequence[str], most: int) -> list[list[str]]:

@@ -2,48 +2,36 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+import numpy as np
 import pandas as pd
 
-from dikbench.metrics import VIOLATION_TOLERANCE
-from dikbench.report.sentences.paired_wins import SAME, Lead, lead
+from dikbench.arrays import Mask
+from dikbench.metrics import Outcome
+from dikbench.report.selection.judged import IN_WORDS
 from dikbench.report.sentences.words import (
     Contender,
     Names,
-    degrees,
     listed,
     millimetres,
     number,
     several,
 )
+from dikbench.statistics.failures import ran
+from dikbench.statistics.first_places import first_places
 from dikbench.statistics.stability import LARGEST_DRIFT_SHARE as DRIFT
 from dikbench.statistics.stability import STABLE
+from dikbench.statistics.success import Rates, Setting, paired_means, rates, succeeded
 from dikbench.statistics.trial_matrix import CONTENDER
 
-ON_COURSE: Final = math.radians(1.0)
-"""A formulation that is never farther off course than this stays on it."""
+SMALLEST_DISTANCE_M: Final = 1e-5
+"""Distances from the path below this are equally small: what is left is the sampling."""
 
-KEPT: Final = {
-    "position_violation_max_rad": VIOLATION_TOLERANCE,
-    "velocity_violation_max_rad_s": VIOLATION_TOLERANCE,
-    "acceleration_violation_max_rad_s2": 1e3 * VIOLATION_TOLERANCE,
-    "distance_violation_max_m": VIOLATION_TOLERANCE,
-    "torque_violating_share": 0.0,
-}
-"""Limits that are passed by no more than this are kept: a solver's tolerance; that of velocities,
-over a control period of 1 ms, is the one of accelerations; of distances, what is not linear in a
-step. Limits of torques have their tolerance in the metric."""
-
-TRUSTED: Final = 0.01
-"""Formulations whose solver's answers fail the recheck in more than this share of a run's steps
-lead in nothing: a wrong answer can look better than the right one."""
-
-NOBODY: Final = "No formulation in this run"
-ALL_ANSWERED: Final = "No trial failed and every step was answered."
+SAME_SHARE: Final = 0.01
+"""Shares that differ by less than this part of the larger one are the same."""
 
 
 @dataclass(frozen=True)
@@ -59,207 +47,203 @@ class Finding:
     text: str
 
 
-def candidates(rows: pd.DataFrame) -> list[Contender]:
-    """The laws that ran every trial of the rows without failing, with answers that can be trusted.
+@dataclass(frozen=True)
+class Leaders:
+    """Who is first in a situation of a setting.
+
+    Attributes:
+        contenders: the formulations that are first.
+        found: the rates of all.
+        finding: the sentence.
+    """
+
+    contenders: tuple[Contender, ...]
+    found: Rates
+    finding: Finding
+
+
+def leaders(
+    part: pd.DataFrame, setting: Setting, candidates: set[Contender], names: Names
+) -> Leaders | None:
+    """Say who succeeds most in a situation; None where nobody can be named.
 
     Args:
-        rows: trials of one plant and one reference mode.
+        part: the rows of the situation that count.
+        setting: of the rows.
+        candidates: who may be named (see `dependable`).
+        names: how formulations are called.
     """
-    trials = len(rows[["scenario", "seed"]].drop_duplicates())
-    groups = rows.groupby(CONTENDER, sort=False)
-    whole = (
-        rows.assign(ok=rows["status"].eq("ok")).groupby(CONTENDER, sort=False)["ok"].sum() == trials
+    found = rates(part, succeeded(part))
+    first = first_places(part, found, candidates)
+    if not first.any():
+        return None
+    all_names = list(found.contenders.itertuples(index=False, name=None))
+    order = sorted(np.flatnonzero(first), key=lambda k: -found.rate[k])
+    groups: dict[str, list[Contender]] = {}
+    for k in order:
+        groups.setdefault(number(100 * found.rate[k]), []).append(all_names[k])
+    said = [f"{names.of(group)} with {share} %" for share, group in groups.items()]
+    text = f"success of {_sample(part)}: {'; '.join(said)}"
+    if len(order) > 1:
+        text += ", not told apart"
+    text += _next(found, first, candidates, names) + _pace(part, setting, first, found)
+    contenders = tuple(all_names[k] for k in order)
+    return Leaders(contenders, found, Finding(f"First where {IN_WORDS[setting]}", f"{text}."))
+
+
+def _sample(part: pd.DataFrame) -> str:
+    """Say over how many cases rates are."""
+    cases = part[["scenario", "seed"]].drop_duplicates()
+    return (
+        f"{several(len(cases), 'case')} ({several(cases['scenario'].nunique(), 'scenario')}, "
+        f"{several(part['robot'].nunique(), 'robot')})"
     )
-    trusted = groups["not_verified_share"].max().fillna(0.0) <= TRUSTED
-    return list(whole[whole & trusted].index)
 
 
-def keepers(rows: pd.DataFrame) -> list[Contender]:
-    """The candidates that keep every limit that is in force, in every trial."""
-    worst = rows.groupby(CONTENDER, sort=False)[list(KEPT)].max().fillna(0.0)  # not in force: kept
-    kept = (worst <= pd.Series(KEPT)).all(axis=1)
-    return [contender for contender in candidates(rows) if kept[contender]]
+def _next(found: Rates, first: Mask, candidates: set[Contender], names: Names) -> str:
+    """Name the best of the candidates that can be told apart from the first."""
+    all_names = list(found.contenders.itertuples(index=False, name=None))
+    others = [
+        k
+        for k, name in enumerate(all_names)
+        if name in candidates and not found.best[k] and found.upper[k] < 0
+    ]
+    if not others or not first.any():
+        return ""
+    k = max(others, key=lambda k: float(found.rate[k]))
+    return (
+        f"; next is {names.of([all_names[k]])} with {number(100 * found.rate[k])} %, "
+        f"{number(-100 * found.upper[k])} to {number(-100 * found.lower[k])} points less"
+    )
 
 
-def most_accurate(rows: pd.DataFrame, names: Names) -> Finding:
-    """Who follows the target most closely, whatever it takes."""
-    question = "Most accurate"
-    found = _closest(rows, candidates(rows))
-    if found is None:
-        return Finding(question, f"{NOBODY} went through all trials with answers to be trusted.")
-    leader, measure = found
-    text = _accuracy(leader, measure, names)
-    keeping = set(leader.contenders) & set(keepers(rows))
-    if keeping == set(leader.contenders):
-        text += ". Every limit is kept"
-    elif not keeping:
-        peaks = rows.groupby(CONTENDER)["velocity_peak_ratio"].max()
-        peak = max(peaks[contender] for contender in leader.contenders)
-        text += ". The limits are not kept"
-        text += f": joint speeds reach {number(peak)} times their limit" if peak > 1 else ""
-    return Finding(question, f"{text}.")
+def _pace(part: pd.DataFrame, setting: Setting, first: Mask, found: Rates) -> str:
+    """Say how much time they take where the path waits."""
+    if setting != "path":
+        return ""
+    done = part["slow_down"].where(succeeded(part)).to_numpy(dtype=float)
+    values = found.layout.fill(done)[:, np.flatnonzero(first)]
+    if np.isnan(values).all():
+        return ""
+    medians = np.nanmedian(values, axis=0)
+    low, high = number(float(medians.min())), number(float(medians.max()))
+    much = low if low == high else f"{low} to {high}"
+    return f". They take {much} times the nominal duration (medians of what they did)"
 
 
-def most_accurate_within_limits(rows: pd.DataFrame, names: Names) -> Finding:
-    """Who follows the target most closely of those that keep every limit."""
-    question = "Most accurate within the limits"
-    found = _closest(rows, keepers(rows))
-    if found is None:
-        return Finding(question, f"{NOBODY} keeps every limit here.")
-    if _closest(rows, candidates(rows)) == found:
-        return Finding(question, "The same.")
-    return Finding(question, f"{_accuracy(*found, names)}.")
+def most_accurate(part: pd.DataFrame, leading: Leaders, names: Names) -> Finding | None:
+    """Say who of the first is nearest to the path, in trials that all of them did.
+
+    None where they are alike, or where there is one alone.
+    """
+    if len(leading.contenders) < 2 or part["judged_by_path"].eq(0).all():
+        return None
+    found = leading.found
+    all_names = list(found.contenders.itertuples(index=False, name=None))
+    columns = [all_names.index(name) for name in leading.contenders]
+    away = part["contour_error_6d_max_m"].clip(lower=SMALLEST_DISTANCE_M).where(succeeded(part))
+    matrix = found.layout.fill(np.log(away.to_numpy(dtype=float)))[:, columns]
+    common = ~np.isnan(matrix).any(axis=1)
+    if common.sum() < 2:
+        return None
+    matrix[~common] = np.nan
+    best = int(np.nanmean(matrix, axis=0).argmin())
+    means, lower, _ = paired_means(matrix - matrix[:, [best]], found)
+    together = [k for k in range(len(columns)) if not lower[k] > 0]
+    behind = [k for k in range(len(columns)) if lower[k] > 0]
+    if not behind:
+        return None
+    second = min(behind, key=lambda k: float(means[k]))
+    value = float(np.exp(np.nanmedian(matrix[:, best])))
+    text = (
+        f"of these {names.of([leading.contenders[k] for k in together])}, "
+        f"{millimetres(value)} from the path at most (median of "
+        f"{several(int(common.sum()), 'case')} that all of them did; angles count with 0.2 m); "
+        f"next is "
+        f"{names.of([leading.contenders[second]])}, {number(float(np.exp(means[second])))} times "
+        "as far"
+    )
+    return Finding("Most accurate", f"{text}.")
 
 
-def keep_limits(rows: pd.DataFrame, names: Names) -> Finding:
-    """Who keeps every limit."""
-    contenders, every = keepers(rows), rows[CONTENDER].drop_duplicates()
-    question = "Keeps every limit"
-    if contenders:
-        return Finding(
-            question,
-            f"{names.of(contenders)}: {len(contenders)} of {len(every)} formulations "
-            f"with their solvers, in "
-            f"{_every_trial(rows)}.",
-        )
-    return Finding(question, f"{NOBODY} keeps every limit in {_every_trial(rows)}.")
+def broke_off(rows: pd.DataFrame, names: Names) -> Finding | None:
+    """Name everybody that had trials which did not run or diverged; None where all ran."""
+    rows = ran(rows)
+    failed = rows[rows["outcome"].isin([Outcome.DID_NOT_RUN.value, Outcome.DIVERGED.value])]
+    if failed.empty:
+        return None
+    totals = rows.groupby(CONTENDER, sort=False).size()
+    said = []
+    for (formulation, solver), part in failed.groupby(CONTENDER, sort=False):
+        contender = (str(formulation), str(solver))
+        counts = part["status"].value_counts().items()
+        reasons = listed([f"{count} {status}" for status, count in counts])
+        total = totals[contender]
+        said.append(f"{names.of([contender])} in {len(part)} of {total} trials ({reasons})")
+    return Finding("Broke off", f"{listed(said)}.")
 
 
-def stay_on_course(rows: pd.DataFrame, names: Names) -> Finding:
-    """Who slows down rather than leave the wanted direction, and who of them gets on best."""
-    question = "Stays on course"
-    worst = rows.groupby(CONTENDER, sort=False)["off_course_max_rad"].max()
-    ran = [contender for contender in candidates(rows) if not math.isnan(worst[contender])]
-    if not ran:
-        return Finding(question, f"{NOBODY} went through all trials with answers to be trusted.")
-    staying = [contender for contender in ran if worst[contender] <= ON_COURSE]
-    if not staying:
-        least = min(ran, key=lambda contender: float(worst[contender]))
-        return Finding(
-            question,
-            f"{NOBODY} stays within {degrees(ON_COURSE)} of the wanted direction; "
-            f"nearest to it {names.of([least])}, at most {degrees(worst[least])} off.",
-        )
-    text = f"{names.of(staying)}: never more than {degrees(ON_COURSE)} off the wanted direction"
-    keeping = [contender for contender in keepers(rows) if contender in set(staying)]
-    leader = lead(rows.assign(slowness=-rows["progress_mean"]), "slowness", keeping)
-    if leader is None:
-        return Finding(question, f"{text}, but none of them keeps every limit.")
-    speed = f"at {number(-100 * leader.value)} % of the wanted speed (median)"
-    if leader.runner_up is not None:
-        best = f"{names.of(leader.contenders)} get{'s' * (len(leader.contenders) == 1)} on best"
-    else:
-        best = names.of(keeping) + (" get on alike" if len(keeping) > 1 else " alone gets on")
-        if len(keeping) == len(staying) > 1:
-            best = "they get on alike"
-    return Finding(question, f"{text}. Within the limits {best}, {speed}.")
-
-
-def fail_most(rows: pd.DataFrame, names: Names) -> Finding:
-    """Who fails most: by trials that broke off, else by steps that a law had no answer for."""
-    question = "Fails most"
-    failed = rows["status"].ne("ok")
-    groups = rows.assign(failed=failed).groupby(CONTENDER, sort=False)
-    shares = groups["failed"].mean()
-    if failed.any():
-        most = list(shares[shares.ge(shares.max() - SAME)].index)
-        counts = rows[failed].set_index(CONTENDER).loc[most, "status"].value_counts()
-        reasons = listed([f"{number} {status}" for status, number in counts.items()])
-        ended = several(int(groups["failed"].sum()[most].sum()), "trial")
-        each = " each" if len(most) > 1 else ""
-        return Finding(
-            question,
-            f"{names.of(most)}: {number(100 * shares.max())} % of the trials{each} "
-            f"({ended}: {reasons}).",
-        )
-    of_a_run = rows[["infeasible_share", "solver_failed_share"]].sum(axis=1)
-    unanswered = rows.assign(unanswered=of_a_run).groupby(CONTENDER, sort=False)["unanswered"].max()
-    worst = float(unanswered.max())
-    if worst <= 0:
-        return Finding(question, ALL_ANSWERED)
-    most = list(unanswered[unanswered.ge(worst - SAME)].index)
+def unanswered(rows: pd.DataFrame, names: Names) -> Finding | None:
+    """Name who had no answer in the largest share of a run's steps; None where all had."""
+    shares = ran(rows)[["infeasible_share", "solver_failed_share"]].sum(axis=1)
+    worst = ran(rows).assign(share=shares).groupby(CONTENDER, sort=False)["share"].max()
+    if worst.empty or not worst.max() > 0:
+        return None
+    most = list(worst[worst >= (1 - SAME_SHARE) * worst.max()].index)
     return Finding(
-        question,
-        f"No trial failed; {names.of(most)} had no answer in up to {number(100 * worst)} % of a "
-        "run's steps, and was slowed down.",
+        "No answer",
+        f"{names.of(most)} had no answer in up to {number(100 * worst.max())} % of a run's steps, "
+        "and braked instead.",
     )
 
 
-def fastest(rows: pd.DataFrame, within_limits: Sequence[Contender], names: Names) -> Finding:
-    """Whose call takes the least time, of all formulations and of those that keep every limit.
+def first_most_often(
+    firsts: Sequence[tuple[Setting, tuple[Contender, ...]]], names: Names
+) -> list[Finding]:
+    """Say for each setting who is first, alone or tied, in the most situations."""
+    found = []
+    for setting, where in IN_WORDS.items():
+        of_setting = [contenders for each, contenders in firsts if each == setting]
+        counts: dict[Contender, int] = {}
+        for contenders in of_setting:
+            for contender in contenders:
+                counts[contender] = counts.get(contender, 0) + 1
+        if not counts:
+            continue
+        most = max(counts.values())
+        who = [contender for contender, count in counts.items() if count == most]
+        of = several(len(of_setting), "situation")
+        text = f"{names.of(who)}, alone or tied, in {most} of {of} in which somebody can be named"
+        found.append(Finding(f"First most often where {where}", f"{text}."))
+    return found
+
+
+def fastest(rows: pd.DataFrame, among: Sequence[Contender], names: Names) -> Finding | None:
+    """Say whose call takes the least time of those who are first somewhere; None without times.
 
     Args:
         rows: trials, of any plant.
-        within_limits: the formulations that keep every limit.
+        among: who is first in a situation.
         names: how they are called.
     """
-    question = "Fastest"
     cells = rows.drop_duplicates([*CONTENDER, "scenario"])
     cells = cells[cells["formulation_time_median_us"].notna()]
+    keys = pd.MultiIndex.from_frame(cells[CONTENDER])
+    cells = cells[keys.isin(list(among))]
     if cells.empty:
-        return Finding(question, "No times were taken.")
+        return None
     timed = cells.groupby(CONTENDER, sort=False)["scenario"].nunique()
     medians = cells.groupby(CONTENDER, sort=False)["formulation_time_median_us"].median()
     medians = medians[timed.eq(timed.max())].sort_values(kind="stable")
-    parts = [_quickest(medians, names)]
-    keeping = medians[[contender for contender in medians.index if contender in set(within_limits)]]
-    if len(keeping) and not set(keeping.index[:1]) <= set(_alike(medians)):
-        parts.append("of those that keep every limit " + _quickest(keeping, names))
-    if len(medians) > 1:
-        parts.append(
-            f"the slowest, {names.of([medians.index[-1]])}, takes "
-            f"{number(medians.iloc[-1] / medians.iloc[0])} times as long"
-        )
-    text = f"{'; '.join(parts)} (medians over {several(int(timed.max()), 'scenario')})."
+    alike = list(medians[medians <= (1 + DRIFT) * medians.iloc[0]].index)
+    text = f"{names.of(alike)}, {number(medians.iloc[0] / 1e3)} ms a call"
+    if len(alike) > 1:
+        text += f" (not told apart: a stable time may drift by {number(100 * DRIFT)} %)"
+    if len(medians) > len(alike):
+        slowest = number(medians.iloc[-1] / medians.iloc[0])
+        text += f"; the slowest, {names.of([medians.index[-1]])}, takes {slowest} times as long"
+    text += f" (medians over {several(int(timed.max()), 'scenario')})"
     unstable = int(cells["timing_stability"].ne(STABLE).sum())
     if unstable:
-        text += f" Of {len(cells)} timed cells {unstable} are not stable."
-    return Finding(question, text)
-
-
-def _quickest(medians: pd.Series, names: Names) -> str:
-    alike = _alike(medians)
-    if len(alike) == 1:
-        return f"{names.of(alike)} takes {number(medians.iloc[0])} us a call"
-    return (
-        f"{names.of(alike)} take {number(medians.iloc[0])} to {number(medians[alike].max())} "
-        f"us a call, which is not told apart (a stable time may drift by {number(100 * DRIFT)} %)"
-    )
-
-
-def _alike(medians: pd.Series) -> list[Contender]:
-    """Those whose times are no farther from the shortest than a stable time may drift."""
-    return list(medians[medians <= (1 + DRIFT) * medians.iloc[0]].index)
-
-
-def _closest(
-    rows: pd.DataFrame, contenders: Sequence[Contender]
-) -> tuple[Lead, Callable[[float], str]] | None:
-    """Who leads in the position error, or in that of the orientation where there is no other."""
-    for metric, measure in (
-        ("position_error_rms_m", millimetres),
-        ("orientation_error_rms_rad", degrees),
-    ):
-        leader = lead(rows, metric, contenders)
-        if leader is not None:
-            return leader, measure
-    return None
-
-
-def _accuracy(leader: Lead, measure: Callable[[float], str], names: Names) -> str:
-    one = leader.trials == 1
-    rms = "rms" if one else f"rms, median over {leader.trials} trials"
-    together = ", not told apart," if len(leader.contenders) > 1 else ""
-    text = f"{names.of(leader.contenders)}{together} with {measure(leader.value)} ({rms})"
-    if leader.runner_up is None:
-        return text
-    behind = "" if one else f", behind in {leader.wins} of {leader.trials}"
-    return (
-        f"{text}; next is {names.of([leader.runner_up])} with {measure(leader.runner_up_value)}"
-        f"{behind}"
-    )
-
-
-def _every_trial(rows: pd.DataFrame) -> str:
-    trials = len(rows[["scenario", "seed"]].drop_duplicates())
-    return "the only trial" if trials == 1 else f"all {trials} trials"
+        text += f"; {unstable} of {len(cells)} timed cells are not stable"
+    return Finding("Fastest of those who are first somewhere", f"{text}.")

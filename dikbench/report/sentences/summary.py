@@ -6,20 +6,21 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from dikbench.report.selection.situations import READING_ORDER, Situation, situation_of
+from dikbench.report.selection.judged import DEFINITIONS, SETTINGS, judged_plant, judged_rows
 from dikbench.report.sentences.findings import (
-    ALL_ANSWERED,
     Finding,
-    fail_most,
+    broke_off,
     fastest,
-    keep_limits,
-    keepers,
+    first_most_often,
+    leaders,
     most_accurate,
-    most_accurate_within_limits,
-    stay_on_course,
+    unanswered,
 )
-from dikbench.report.sentences.words import Names, several
-from dikbench.scenario.oracle import ORACLE
+from dikbench.report.sentences.words import Contender, Names, several
+from dikbench.scenario.oracle import ORACLES
+from dikbench.scenario.situation import Situation
+from dikbench.statistics.first_places import dependable
+from dikbench.statistics.success import Setting, with_facts
 
 
 @dataclass(frozen=True)
@@ -28,11 +29,13 @@ class Chapter:
 
     Attributes:
         situation: which.
+        definition: what holds in it.
         scenarios: selectors of its scenarios.
         findings: what is said of it.
     """
 
     situation: Situation
+    definition: str
     scenarios: tuple[str, ...]
     findings: tuple[Finding, ...]
 
@@ -60,53 +63,57 @@ class Summary:
 def summarise(trials: pd.DataFrame) -> Summary:
     """Say which formulation is for which situation.
 
-    Plants and reference modes are never pooled: the ideal plant is spoken of, on which violations
-    show, and the clock as reference, where they were run.
-
     Args:
         trials: the rows of trials.csv.
     """
-    contenders = trials[trials["formulation"].ne(ORACLE) & trials["status"].ne("skipped")]
+    contenders = trials[~trials["formulation"].isin(ORACLES) & trials["status"].ne("skipped")]
     if contenders.empty:
         return Summary("No formulation was run.")
-    plant, reference = _first(contenders["plant"], "ideal"), _first(contenders["reference"], "time")
-    rows = contenders[contenders["plant"].eq(plant) & contenders["reference"].eq(reference)]
+    if trials["feasible"].fillna("").eq("").all():
+        return Summary(
+            "These results are of a version without outcomes, so that nothing is concluded from "
+            "them: `dikbench recompute` adds outcomes where traces were kept."
+        )
     names = Names(contenders)
-    seed = int(rows["seed"].min())
-    kinds = {scenario: situation_of(scenario, seed) for scenario in rows["scenario"].unique()}
+    of_setting = {setting: judged_rows(trials, setting) for setting in SETTINGS}
+    candidates = {
+        setting: dependable(rows) if len(rows) else set() for setting, rows in of_setting.items()
+    }
     chapters = []
-    for situation in READING_ORDER:
-        scenarios = tuple(scenario for scenario, kind in kinds.items() if kind is situation)
+    firsts: list[tuple[Setting, tuple[Contender, ...]]] = []
+    for situation, definition in DEFINITIONS.items():
+        findings: list[Finding] = []
+        scenarios: dict[str, None] = {}
+        for setting, rows in of_setting.items():
+            part = rows[rows["situation"].eq(situation)]
+            scenarios |= dict.fromkeys(part["scenario"].unique())
+            leading = leaders(part, setting, candidates[setting], names) if len(part) else None
+            if leading is None:
+                continue
+            firsts.append((setting, leading.contenders))
+            findings.append(leading.finding)
+            if setting == "path" and (closest := most_accurate(part, leading, names)):
+                findings.append(closest)
         if scenarios:
-            findings = _findings(rows[rows["scenario"].isin(scenarios)], names)
-            chapters.append(Chapter(situation, scenarios, findings))
-    clock = reference == "time"
-    basis = (
-        f"These sentences are about the {plant} plant with a reference that moves on with "
-        f"{'the clock' if clock else 'the progress achieved'}: {several(len(kinds), 'scenario')}, "
-        f"{several(rows['seed'].nunique(), 'seed')}. A law leads only where it ran all trials "
-        "without failing and the answers of its solver passed the recheck."
-    )
+            chapters.append(Chapter(situation, definition, tuple(scenarios), tuple(findings)))
+    among = list(dict.fromkeys(contender for _, who in firsts for contender in who))
     short = (
-        keep_limits(rows, names),
-        stay_on_course(rows, names),
-        fastest(contenders, keepers(rows), names),
-        fail_most(contenders, names),
+        *first_most_often(firsts, names),
+        fastest(contenders, among, names),
+        broke_off(contenders, names),
+        unanswered(contenders, names),
     )
-    return Summary(basis, short, tuple(chapters))
+    return Summary(_basis(trials), tuple(each for each in short if each), tuple(chapters))
 
 
-def _first(values: pd.Series, wanted: str) -> str:
-    """The wanted value where it occurs, else the first."""
-    return wanted if values.eq(wanted).any() else str(values.iloc[0])
-
-
-def _findings(rows: pd.DataFrame, names: Names) -> tuple[Finding, ...]:
-    found = (
-        most_accurate(rows, names),
-        most_accurate_within_limits(rows, names),
-        keep_limits(rows, names),
-        stay_on_course(rows, names),
-        fail_most(rows, names),
+def _basis(trials: pd.DataFrame) -> str:
+    """Say of which trials the summary speaks."""
+    plant = judged_plant(trials)
+    cases = with_facts(trials[trials["plant"].eq(plant)]).drop_duplicates(["scenario", "seed"])
+    known = int(cases["feasible"].isin(["time", "path"]).sum())
+    return (
+        f"Success on the {plant} plant in the {known} of {several(len(cases), 'case')} (a scenario "
+        "with a seed) that a known motion can do. First is named who cannot be told apart from the "
+        "best (95 % paired intervals), keeps the limits that it is told of in all situations, and "
+        "is not slower than another of them; of the rest nothing is said."
     )
-    return tuple(finding for finding in found if finding.text != ALL_ANSWERED)

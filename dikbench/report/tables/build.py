@@ -1,55 +1,78 @@
-"""Make the tables from the rows of trials.csv: each overall and per family."""
+"""Make the tables of all runs from the rows of trials.csv: each overall and per family."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from math import nan
+from typing import Literal
 
 import numpy as np
 import pandas as pd
 
-from dikbench.arrays import Mask
-from dikbench.report.tables.kinds import DERIVED, FAILURES, Quantity, TableKind
-from dikbench.report.tables.sample import SMALLEST_DIFFERENCE, Sample, describe
-from dikbench.report.tables.table import ALL, DIGITS, Block, Column, Table, TableRow
-from dikbench.statistics.failures import failures_at_worst, has_failed, ran
+from dikbench.arrays import Array
+from dikbench.metrics import METRICS
+from dikbench.report.tables.kinds import DERIVED, Quantity, Statistic, TableKind
+from dikbench.report.tables.table import ALL, Block, Column, Table, TableCell, TableRow
+from dikbench.statistics.failures import failures_at_worst, ran
+from dikbench.statistics.first_places import BROKEN
 from dikbench.statistics.stability import STABLE
 from dikbench.statistics.trial_matrix import CONTENDER
 
-HOW = ["plant", "reference"]
+SETTING = ["plant", "reference"]
 
 _Setting = tuple[str | None, str | None]
 
 
 def make_table(kind: TableKind, trials: pd.DataFrame) -> Table:
-    """A table, overall and per family; plants and reference modes are never pooled.
+    """Make a table, overall and per family; plants and reference modes are never pooled.
 
-    Trials that were skipped count nowhere; a formulation of which all trials were skipped has no
-    row.
+    Every run counts, whatever came of it. Trials that were skipped count nowhere; a formulation of
+    which all trials were skipped has no row.
 
     Args:
         kind: which table.
         trials: the rows of trials.csv (of times, rows of timing.csv with a status will do).
     """
-    chosen = [q for q in (*FAILURES, *kind.quantities) if q.of in {*trials.columns, *DERIVED}]
+    chosen = [q for q in kind.quantities if q.of in {*trials.columns, *DERIVED}]
     rows = _derived(ran(trials))
     if not kind.times:  # a failure is never folded into a time
         measured = {q.of for q in chosen} - set(DERIVED)
         rows = rows.assign(**{name: failures_at_worst(rows, name) for name in sorted(measured)})
-    columns = tuple(describe(quantity, rows) for quantity in chosen)
+    columns = tuple(_column(quantity) for quantity in chosen)
     blocks = [
-        _block(kind, chosen, columns, name, how, part)
+        _block(kind, chosen, name, setting, part)
         for name, of_family in _families(rows)
-        for how, part in _settings(kind, of_family)
+        for setting, part in _settings(kind, of_family)
     ]
-    return Table(kind.name, kind.title, columns, tuple(blocks), tuple(_notes(kind, columns)))
+    return Table(kind.name, kind.title, columns, tuple(blocks), tuple(_notes(kind)))
+
+
+def _column(quantity: Quantity) -> Column:
+    return Column(
+        key=quantity.key,
+        heading=quantity.heading,
+        definition=f"{quantity.statistic.value} of: {quantity.definition}",
+        better=_better(quantity),
+        count=quantity.statistic is Statistic.NUMBER,
+        shown=quantity.shown,
+    )
+
+
+def _better(quantity: Quantity) -> Literal["low", "high"] | None:
+    """Say which direction of a quantity is better."""
+    if quantity.statistic is Statistic.NUMBER:
+        return None
+    metric = METRICS.get(quantity.of)
+    return metric.best if metric else "low"
 
 
 def _derived(rows: pd.DataFrame) -> pd.DataFrame:
     """Add what is counted as columns of zeros and ones."""
     timed = rows["formulation_time_median_us"].notna()
+    outcome = rows["outcome"] if "outcome" in rows else pd.Series("", rows.index)
     return rows.assign(
         trial=1.0,
-        failed=has_failed(rows).astype(float),
+        stopped=outcome.isin(BROKEN).astype(float).where(outcome.fillna("").ne("")),
         timed=timed.astype(float),
         unstable=(timed & (rows["timing_stability"] != STABLE)).astype(float),
     )
@@ -63,68 +86,63 @@ def _families(rows: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
 
 
 def _settings(kind: TableKind, rows: pd.DataFrame) -> Iterator[tuple[_Setting, pd.DataFrame]]:
-    """The rows of each plant and reference mode; of times, all of them."""
+    """Yield the rows of each plant and reference mode; of times, all of them."""
     if kind.times:
         yield (None, None), rows
         return
-    for (plant, reference), part in rows.groupby(HOW, sort=False):
+    for (plant, reference), part in rows.groupby(SETTING, sort=False):
         yield (str(plant), str(reference)), part
 
 
 def _block(
     kind: TableKind,
     quantities: Sequence[Quantity],
-    columns: Sequence[Column],
     family: str,
-    how: _Setting,
+    setting: _Setting,
     rows: pd.DataFrame,
 ) -> Block:
-    contenders = rows[CONTENDER].drop_duplicates()
-    trials = Sample.of(rows, np.zeros(len(contenders), dtype=bool))
-    measured = trials
+    """Make the rows of a family in a setting, one per formulation and solver."""
     if kind.times:
-        one_each = rows.drop_duplicates([*CONTENDER, "scenario"])
-        cells = one_each[[name for name in rows if name not in (*HOW, "seed")]]
-        cells = cells.assign(failed=0.0)  # a time was taken whatever became of the trial
-        measured = Sample.of(cells, _unstable(cells))
-    grid = [
-        (trials if quantity in FAILURES else measured).cells(quantity, column)
-        for quantity, column in zip(quantities, columns, strict=True)
-    ]
-    found = [
-        TableRow(str(formulation), str(solver), tuple(cells))
-        for formulation, solver, *cells in zip(
-            contenders["formulation"], contenders["solver"], *grid, strict=True
-        )
-    ]
-    plant, reference = how
-    return Block(family, plant, reference, tuple(found))
+        rows = rows.drop_duplicates([*CONTENDER, "scenario"])
+    found = []
+    for (formulation, solver), part in rows.groupby(CONTENDER, sort=False):
+        unstable = kind.times and 2 * part["unstable"].sum() >= part["timed"].sum() > 0
+        cells = [_cell(quantity, part, unstable=bool(unstable)) for quantity in quantities]
+        found.append(TableRow(str(formulation), str(solver), tuple(cells)))
+    return Block(family, *setting, tuple(found))
 
 
-def _unstable(cells: pd.DataFrame) -> Mask:
-    """Whether at least half of the timed cells of each formulation are unstable."""
-    sums = cells.groupby(CONTENDER, sort=False)[["timed", "unstable"]].sum()
-    unstable: Mask = (sums["timed"].gt(0) & (2 * sums["unstable"] >= sums["timed"])).to_numpy()
-    return unstable
+def _cell(quantity: Quantity, part: pd.DataFrame, *, unstable: bool) -> TableCell:
+    values = part[quantity.of].to_numpy(dtype=float) if quantity.of in part else np.empty(0)
+    number = quantity.factor * _taken(quantity, values)
+    counts = quantity.statistic is Statistic.NUMBER
+    return TableCell(number, unstable=unstable and not counts)
 
 
-def _notes(kind: TableKind, columns: Sequence[Column]) -> Iterator[str]:
-    """How the numbers of a table were taken."""
-    for column in columns:
-        yield f"{column.heading}: {column.definition}."
+def _taken(quantity: Quantity, values: Array) -> float:
+    """Compute a number from those of the runs of a row, NaN where none is defined.
+
+    Quantiles are values that occurred, since infinity is among them.
+    """
+    defined = values[~np.isnan(values)]
+    if quantity.statistic is Statistic.NUMBER:
+        return float(defined.sum())
+    if not len(defined):
+        return nan
+    if quantity.statistic is Statistic.MEAN:
+        return float(defined.mean())
+    high = _better(quantity) == "high"
+    at = {Statistic.MEDIAN: 0.5, Statistic.P95: 0.95, Statistic.WORST: 1.0}[quantity.statistic]
+    return float(np.quantile(defined, 1 - at if high else at, method="inverted_cdf"))
+
+
+def _notes(kind: TableKind) -> Iterator[str]:
+    """Say how the numbers of a table were taken."""
     if kind.times:
         yield "Times are marked as not to be trusted where half of the timed cells are unstable."
-    else:
-        yield (
-            "A failed trial takes the worst value that a metric has; where that is infinite it "
-            "stands in the failures and in the worst, and averages leave it out."
-        )
+        return
     yield (
-        "Intervals are 95 % bootstrap intervals over families, scenarios and seeds; there is none "
-        "where all trials agree."
+        "Every run counts, whatever came of it; one that broke off takes the worst value that a "
+        "metric has, which may be infinite. Formulations are compared in the table of success."
     )
-    yield (
-        f"The best law is marked where laws differ in {DIGITS} digits and by more than "
-        f"{SMALLEST_DIFFERENCE:g}, among those that have a number of every trial that any law came "
-        "through; the oracle is not compared."
-    )
+    yield "Distances from the path and the target count angles with 0.2 m."

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from math import isnan
 from textwrap import wrap
 
-from dikbench.report.tables.kinds import FAILURES
 from dikbench.report.tables.table import Block, Column, Table, TableCell, TableRow, shown
 
 WIDTH = 120
@@ -15,7 +14,7 @@ WIDTH = 120
 BLOCKS = 2
 """Plants and reference modes that are printed of a table; the others stand in the files."""
 
-ROWS = 12
+ROWS = 24
 """Formulations that are printed of a block."""
 
 NAME = 40
@@ -26,10 +25,10 @@ HEADING = 12
 
 
 def to_text(table: Table) -> str:
-    """The blocks over all families: the most reliable laws first, then by their first average.
+    """Write the blocks over all families, formulations in the order of the study.
 
-    The first columns that fit are printed. The best of a column is starred, times that cannot be
-    trusted are followed by a question mark.
+    The first columns that fit are printed. Who is first in a column is starred, times that cannot
+    be trusted are followed by a question mark.
     """
     parts = [table.title, *(_block(table, block) for block in table.overall[:BLOCKS])]
     if not table.blocks:
@@ -41,31 +40,21 @@ def to_text(table: Table) -> str:
 
 
 def _block(table: Table, block: Block) -> str:
-    numbers = range(len(FAILURES), len(table.columns))
-    first = next((place for place in numbers if table.columns[place].interval), 0)
-    rows = sorted(block.rows, key=lambda row: (row.cells[0].value, *_last_if_nan(row.cells[first])))
-    top = rows[:ROWS]
-    columns = [
-        ["formulation", *(_name(row) for row in top)],
-        ["failed", *(f"{row.cells[1].value:.0f}/{row.cells[2].value:.0f}" for row in top)],
-    ]
-    for place in numbers:
+    top = block.rows[:ROWS]
+    columns = [["formulation", *(_name(row) for row in top)]]
+    for place in table.shown:
         column = table.columns[place]
         columns.append([column.heading, *(_text(column, row.cells[place]) for row in top)])
     lines = [block.setting] if block.setting else []
     lines += _fitting(columns)
-    if len(rows) > ROWS:
-        lines.append(f"and {len(rows) - ROWS} more: tables/{table.name}.md")
+    if len(block.rows) > ROWS:
+        lines.append(f"and {len(block.rows) - ROWS} more: tables/{table.name}.md")
     return "\n".join(lines)
-
-
-def _last_if_nan(cell: TableCell) -> tuple[bool, float]:
-    return (True, 0.0) if isnan(cell.value) else (False, cell.value)
 
 
 def _fitting(columns: Sequence[Sequence[str]]) -> list[str]:
     """Lines of the first columns that fit, under headings of several lines."""
-    headings = [wrap(heading, HEADING) for heading, *_ in columns]
+    headings = [wrap(heading, HEADING, break_long_words=False) for heading, *_ in columns]
     height = max(map(len, headings))
     lines = [""] * (height + len(columns[0]) - 1)
     for place, (heading, column) in enumerate(zip(headings, columns, strict=True)):
@@ -89,6 +78,8 @@ def _name(row: TableRow) -> str:
 
 
 def _text(column: Column, cell: TableCell) -> str:
+    if cell.text:
+        return f"{cell.text} "
     if isnan(cell.value):
         return ""
     if column.count:

@@ -1,9 +1,8 @@
-"""A table as CSV: plain numbers in full, the bounds of intervals and the shifts beside them."""
+"""A table as CSV: plain numbers in full, and the bounds of intervals."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import isnan
 
 import pandas as pd
 
@@ -37,13 +36,11 @@ def _setting(table: Table) -> list[str]:
     return ["plant", "reference"] if any(block.plant for block in table.blocks) else []
 
 
-def _numbers(column: Column, cell: TableCell) -> Iterator[tuple[str, float | int]]:
+def _numbers(column: Column, cell: TableCell) -> Iterator[tuple[str, float | int | str]]:
     if column.count:
         yield column.key, int(cell.value)
         return
-    yield column.key, cell.value
+    yield column.key, cell.text or cell.value
     if column.interval:
         yield f"{column.key}_lower", cell.lower
         yield f"{column.key}_upper", cell.upper
-    if not isnan(column.shift):
-        yield f"{column.key}_shift", column.shift

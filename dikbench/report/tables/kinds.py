@@ -1,22 +1,32 @@
-"""What stands in the three tables: tracking error, limit violation, timing."""
+"""What stands in the three tables of every run: tracking error, limit violation, timing."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from math import degrees
 from types import MappingProxyType
+from typing import Final
 
 from dikbench.metrics import METRICS
 from dikbench.results.columns import TIMES
 
+MM: Final = 1e3
+DEG: Final = degrees(1.0)
+PERCENT: Final = 100.0
+MS: Final = 1e-3
+"""Factors to the units of tables: millimetres of metres, degrees of radians, percent of shares,
+milliseconds of microseconds."""
+
 
 class Statistic(Enum):
-    """How the trials of a row become one number; its value is how notes say it."""
+    """How the runs of a row become one number; its value is how notes say it."""
 
-    GEOMETRIC_MEAN = "shifted geometric mean"
+    MEDIAN = "median"
+    P95 = "95 % of the runs are at least as good as this"
+    WORST = "worst run"
     MEAN = "mean"
-    WORST = "worst"
     NUMBER = "number"
 
 
@@ -25,19 +35,21 @@ class Quantity:
     """A column of a table: a column of the trials and what is taken of it.
 
     Attributes:
-        of: column of trials.csv, or of what is derived from it (see `tables.build`);
-            where it is absent (older results), so is the quantity.
-        statistic: what is taken over the trials of a row.
-        heading: what stands above it.
+        of: column of trials.csv, or of what is derived from it (see `DERIVED`); where it is absent
+            (older results), so is the quantity.
+        statistic: what is taken over the runs of a row.
+        heading: its heading, with the unit in brackets.
         key: its name in CSV.
-        compared: whether the best formulation is marked.
+        factor: from the unit of the column to that of the table.
+        shown: whether it is shown, or stands in the CSV alone.
     """
 
     of: str
     statistic: Statistic
     heading: str
     key: str
-    compared: bool = True
+    factor: float = 1.0
+    shown: bool = True
 
     @property
     def definition(self) -> str:
@@ -56,7 +68,7 @@ class TableKind:
     Attributes:
         name: of its files.
         title: one line above it.
-        quantities: what it shows after the failures, the most telling first.
+        quantities: its columns, those that are shown first.
         times: whether its numbers are times, which belong to a formulation, a solver and a
             scenario, whatever the plant, reference mode and seed.
     """
@@ -67,112 +79,123 @@ class TableKind:
     times: bool = False
 
 
-DERIVED: Mapping[str, str] = MappingProxyType(
+DERIVED: Final[Mapping[str, str]] = MappingProxyType(
     {
         "trial": "1 for a trial that was not skipped",
-        "failed": "1 for a trial that broke off (diverged, crashed, timed out ...), else 0",
+        "stopped": "1 for a trial that broke a limit, collided or broke off, else 0",
         "timed": "1 for a scenario on which the formulation was timed",
         "unstable": "1 for a scenario on which its times cannot be trusted",
     }
 )
 """Columns that are derived from the rows of trials, to be counted."""
 
-FAILURES = (
-    Quantity("failed", Statistic.MEAN, "failure rate", "failure_rate"),
-    Quantity("failed", Statistic.NUMBER, "failed", "failed", compared=False),
-    Quantity("trial", Statistic.NUMBER, "trials", "trials", compared=False),
-)
-"""The first columns of every table."""
+RUNS: Final = Quantity("trial", Statistic.NUMBER, "runs", "runs")
 
-CELLS = (
-    Quantity("timed", Statistic.NUMBER, "cells timed", "timed", compared=False),
-    Quantity("unstable", Statistic.NUMBER, "unstable", "unstable", compared=False),
-)
-"""What follows them where times are shown."""
+_NAMES: Final = {Statistic.MEDIAN: "median", Statistic.P95: "95 %", Statistic.WORST: "worst"}
+_KEYS: Final = {Statistic.MEDIAN: "median", Statistic.P95: "p95", Statistic.WORST: "worst"}
 
 
-def _average(of: str, heading: str) -> Quantity:
-    """Of what spans orders of magnitude."""
-    return Quantity(of, Statistic.GEOMETRIC_MEAN, heading, of)
+def _spread(
+    of: str,
+    what: str,
+    unit: str,
+    factor: float,
+    *statistics: Statistic,
+    key: str = "",
+    shown: bool = True,
+) -> list[Quantity]:
+    """Make a column per statistic; default: median, 95 % and worst."""
+    in_brackets = f" [{unit}]" if unit else ""
+    suffix = {"mm": "_mm", "deg": "_deg", "%": "_percent", "ms": "_ms"}.get(unit, "")
+    return [
+        Quantity(
+            of,
+            statistic,
+            f"{what} {_NAMES[statistic]}{in_brackets}",
+            f"{key or what.replace(' ', '_')}_{_KEYS[statistic]}{suffix}",
+            factor,
+            shown,
+        )
+        for statistic in statistics or tuple(_NAMES)
+    ]
 
 
-def _mean(of: str, heading: str) -> Quantity:
-    """Of shares."""
-    return Quantity(of, Statistic.MEAN, heading, of)
+def _more(of: str, what: str, unit: str = "", factor: float = 1.0) -> list[Quantity]:
+    """Make the three columns of a quantity that stands in the CSV alone."""
+    return _spread(of, what, unit, factor, shown=False)
 
 
-def _worst(of: str, heading: str) -> Quantity:
-    return Quantity(of, Statistic.WORST, heading, f"{of}_worst")
+_WORST: Final = Statistic.WORST
 
-
-def _part(of: str, heading: str) -> Quantity:
-    """Of a time: a part of it, in which nobody wins."""
-    return Quantity(of, Statistic.GEOMETRIC_MEAN, heading, of, compared=False)
-
-
-TRACKING_ERROR = TableKind(
+TRACKING_ERROR: Final = TableKind(
     "tracking_error",
-    "Tracking error: averages over trials, and the worst of them",
+    "Tracking error: the largest in a run, over all runs",
     (
-        _average("contour_error_rms_m", "contour rms [m]"),
-        _worst("contour_error_max_m", "contour worst [m]"),
-        _worst("lag_max_s", "lag worst [s]"),
-        _worst("path_done_share", "path done worst"),
-        _average("position_error_rms_m", "position rms [m]"),
-        _worst("position_error_max_m", "position worst [m]"),
-        _average("orientation_error_rms_rad", "orientation rms [rad]"),
-        _average("off_course_max_rad", "off course [rad]"),
-        _worst("off_course_max_rad", "off course worst [rad]"),
-        _mean("progress_mean", "progress"),
-        _worst("progress_min", "progress worst"),
-        _mean("stuck_share", "stuck share"),
-        _worst("stuck_share", "stuck share worst"),
-        _worst("optimum_distance_max_rad_s", "solver from optimum worst [rad/s]"),
+        RUNS,
+        *_spread("contour_error_6d_max_m", "off the path", "mm", MM),
+        *_spread("tracking_error_6d_max_m", "off the target", "mm", MM),
+        *_spread("path_done_share", "path done", "%", PERCENT, _WORST),
+        *_more("position_error_max_m", "position error", "mm", MM),
+        *_more("position_error_rms_m", "position error rms", "mm", MM),
+        *_more("orientation_error_max_rad", "orientation error", "deg", DEG),
+        *_more("orientation_error_rms_rad", "orientation error rms", "deg", DEG),
+        *_more("contour_error_max_m", "contour error of the position", "mm", MM),
+        *_more("direction_error_max_rad", "direction error", "deg", DEG),
+        *_more("course_rad", "course", "deg", DEG),
+        *_more("lag_max_s", "lag s"),
+        *_more("slow_down", "slow down"),
+        *_more("progress_mean", "progress", "%", PERCENT),
+        *_more("stuck_share", "stuck", "%", PERCENT),
     ),
 )
 
-LIMIT_VIOLATION = TableKind(
+LIMIT_VIOLATION: Final = TableKind(
     "limit_violation",
-    "Limit violation: averages over trials, and the worst of them",
+    "Limit violation: the largest in a run, over all runs",
     (
-        _mean("violating_share", "violating share"),
-        _average("velocity_peak_ratio", "peak speed over limit"),
-        _worst("velocity_peak_ratio", "peak speed over limit worst"),
-        _worst("position_violation_max_rad", "position worst [rad]"),
-        _worst("velocity_violation_max_rad_s", "velocity worst [rad/s]"),
-        _worst("acceleration_violation_max_rad_s2", "acceleration worst [rad/s^2]"),
-        _worst("distance_violation_max_m", "distance below margin worst [m]"),
-        _worst("torque_usage_max", "torque over limit worst"),
-        _mean("torque_violating_share", "torque violating share"),
-        _worst("position_violation_integral_rad_s", "position integral worst [rad*s]"),
-        _worst("velocity_violation_integral_rad", "velocity integral worst [rad]"),
-        _worst("acceleration_violation_integral_rad_s", "acceleration integral worst [rad/s]"),
-        _worst("violating_share", "violating share worst"),
-        _worst("infeasible_share", "infeasible share worst"),
-        _worst("solver_failed_share", "solver failed share worst"),
-        _worst("not_verified_share", "not verified share worst"),
+        RUNS,
+        Quantity("stopped", Statistic.MEAN, "runs stopped [%]", "stopped_percent", PERCENT),
+        *_spread("velocity_peak_ratio", "speed over limit", "", 1.0),
+        *_spread("position_violation_max_rad", "position outside", "deg", DEG, _WORST),
+        *_spread("distance_violation_max_m", "distance missing", "mm", MM, _WORST),
+        *_spread("torque_usage_max", "torque over limit", "", 1.0, _WORST),
+        *_more("acceleration_violation_max_rad_s2", "acceleration above limit rad s2"),
+        *_more("velocity_violation_max_rad_s", "speed above limit rad s"),
+        *_more("violating_share", "steps that violate", "%", PERCENT),
+        *_more("torque_violating_share", "steps with too much torque", "%", PERCENT),
+        *_more("chatter_share", "steps that chatter", "%", PERCENT),
+        *_more("infeasible_share", "infeasible steps", "%", PERCENT),
+        *_more("solver_failed_share", "steps without an answer", "%", PERCENT),
+        *_more("not_verified_share", "steps not verified", "%", PERCENT),
+        *_more("optimum_distance_max_rad_s", "from the optimum rad s"),
     ),
 )
 
-TIMING = TableKind(
+TIMING: Final = TableKind(
     "timing",
-    "Timing of one call of the formulation: averages over scenarios, and the worst of them",
+    "Timing of one call of the formulation, over the scenarios on which it was timed",
     (
-        *CELLS,
-        _average("formulation_time_median_us", "median [us]"),
-        _part("formulation_own_time_median_us", "of it formulation [us]"),
-        _part("solver_core_time_median_us", "solver [us]"),
-        _part("solver_wrapper_time_median_us", "wrapper [us]"),
-        _average("formulation_time_p99_us", "p99 [us]"),
-        _part("formulation_time_p999_us", "p99.9 [us]"),
-        _worst("formulation_time_max_us", "longest [us]"),
-        _worst("missed_1000_hz_share", "missed at 1 kHz worst"),
-        _part("kinematics_time_median_us", "kinematics beside it [us]"),
+        Quantity("timed", Statistic.NUMBER, "scenarios", "scenarios"),
+        *_spread("formulation_time_median_us", "median call", "ms", MS, Statistic.MEDIAN),
+        *_spread("formulation_time_median_us", "median call", "ms", MS, _WORST),
+        *_spread("formulation_time_p99_us", "99 % of the calls", "ms", MS, Statistic.MEDIAN,
+                 key="p99_call"),
+        *_spread("formulation_time_max_us", "longest call", "ms", MS, _WORST),
+        *_spread("solver_core_time_median_us", "of it solver", "ms", MS, Statistic.MEDIAN),
+        *_spread("missed_1000_hz_share", "missed at 1 kHz", "%", PERCENT, _WORST),
+        Quantity("unstable", Statistic.NUMBER, "unstable", "unstable"),
+        *_more("formulation_own_time_median_us", "of it formulation", "ms", MS),
+        *_more("solver_wrapper_time_median_us", "of it wrapper", "ms", MS),
+        *_more("formulation_time_p999_us", "99.9 % of the calls", "ms", MS),
+        *_more("kinematics_time_median_us", "kinematics in addition", "ms", MS),
+        *_more("missed_100_hz_share", "missed at 100 Hz", "%", PERCENT),
+        *_more("missed_200_hz_share", "missed at 200 Hz", "%", PERCENT),
+        *_more("missed_500_hz_share", "missed at 500 Hz", "%", PERCENT),
     ),
     times=True,
-)
+)  # fmt: skip
 
-KINDS = (TRACKING_ERROR, LIMIT_VIOLATION, TIMING)
+KINDS: Final = (TRACKING_ERROR, LIMIT_VIOLATION, TIMING)
 
 
 def kinds_with(column: str) -> list[TableKind]:

@@ -70,10 +70,11 @@ def to_latex_per_family(table: Table) -> str:
 
 def _tabular(table: Table, blocks: Iterable[Block]) -> str:
     r"""A tabular; best in bold, what cannot be trusted in grey (\textcolor, xcolor or color)."""
-    width = 2 + len(table.columns)
-    headings = ["formulation", "solver", *(_heading(column.heading) for column in table.columns)]
+    columns = [table.columns[place] for place in table.shown]
+    width = 2 + len(columns)
+    headings = ["formulation", "solver", *(_heading(column.heading) for column in columns)]
     lines = [
-        f"\\begin{{tabular}}{{ll{'r' * len(table.columns)}}}",
+        f"\\begin{{tabular}}{{ll{'r' * len(columns)}}}",
         r"\toprule",
         _line(headings),
     ]
@@ -82,7 +83,7 @@ def _tabular(table: Table, blocks: Iterable[Block]) -> str:
         if block.setting:
             lines.append(f"\\multicolumn{{{width}}}{{l}}{{\\emph{{{escape(block.setting)}}}}} \\\\")
         for row in block.rows:
-            cells = map(_cell, table.columns, row.cells)
+            cells = map(_cell, columns, (row.cells[place] for place in table.shown))
             lines.append(_line([escape(row.formulation), escape(row.solver), *cells]))
     return "\n".join([*lines, r"\bottomrule", r"\end{tabular}"])
 
@@ -99,6 +100,8 @@ def _line(cells: Iterable[str]) -> str:
 
 
 def _cell(column: Column, cell: TableCell) -> str:
+    if cell.text:
+        return escape(cell.text)
     if isnan(cell.value):
         return ""
     if column.count:

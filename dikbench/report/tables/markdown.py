@@ -63,7 +63,8 @@ def markdown_rows(frame: pd.DataFrame) -> str:
 
 def to_markdown(table: Table) -> str:
     """The table as a page: how its numbers were taken, then a section per family."""
-    notes = [f"- {escape(note)}" for note in table.notes]
+    told = [f"{c.heading}: {c.definition}." for c in table.columns if c.shown]
+    notes = [f"- {escape(note)}" for note in (*told, *table.notes)]
     lines = [f"# {escape(table.title)}", "", *notes, ""]
     for family in dict.fromkeys(block.family for block in table.blocks):
         lines += [f"## {'All families' if family == ALL else escape(family)}", ""]
@@ -79,12 +80,17 @@ def markdown_blocks(table: Table, blocks: Iterable[Block]) -> str:
 
     The best of a block is bold; a dagger follows times that cannot be trusted.
     """
-    header = ["formulation", "solver", *(escape(column.heading) for column in table.columns)]
-    right = [False, False, *(True for _ in table.columns)]
+    columns = [table.columns[place] for place in table.shown]
+    header = ["formulation", "solver", *(escape(column.heading) for column in columns)]
+    right = [False, False, *(True for _ in columns)]
     parts = []
     for block in blocks:
         rows = [
-            [escape(row.formulation), escape(row.solver), *map(_cell, table.columns, row.cells)]
+            [
+                escape(row.formulation),
+                escape(row.solver),
+                *map(_cell, columns, (row.cells[place] for place in table.shown)),
+            ]
             for row in block.rows
         ]
         if block.setting:
@@ -94,6 +100,8 @@ def markdown_blocks(table: Table, blocks: Iterable[Block]) -> str:
 
 
 def _cell(column: Column, cell: TableCell) -> str:
+    if cell.text:
+        return escape(cell.text)
     if isnan(cell.value):
         return ""
     if column.count:

@@ -37,7 +37,8 @@ class Column:
         better: which direction is better; None where neither is (a count of trials).
         interval: whether its cells carry an interval.
         count: whether its cells are whole numbers.
-        shift: of a shifted geometric mean, in the unit of the column; NaN where it is none.
+        difference: whether the interval is of the difference to the best, not of the number.
+        shown: whether it is shown, or stands in the CSV alone.
     """
 
     key: str
@@ -46,7 +47,8 @@ class Column:
     better: Literal["low", "high"] | None = None
     interval: bool = False
     count: bool = False
-    shift: float = nan
+    difference: bool = False
+    shown: bool = True
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,7 @@ class TableCell:
         best: whether no other formulation of the block has a better one (several may be equally
             good).
         unstable: whether it rests on times that cannot be trusted: to be greyed.
+        text: what stands in place of the number; empty: the number.
     """
 
     value: float
@@ -67,6 +70,7 @@ class TableCell:
     upper: float = nan
     best: bool = False
     unstable: bool = False
+    text: str = ""
 
     @property
     def has_interval(self) -> bool:
@@ -111,7 +115,8 @@ class Block:
         """Plant and reference mode in words; empty for times."""
         if self.plant is None:
             return ""
-        return f"{self.plant} plant, {self.reference}-indexed reference"
+        waits = "the path may wait" if self.reference == "path" else "the clock does not wait"
+        return f"{waits} ({self.plant} plant)"
 
 
 @dataclass(frozen=True)
@@ -131,6 +136,11 @@ class Table:
     columns: tuple[Column, ...]
     blocks: tuple[Block, ...]
     notes: Sequence[str]
+
+    @property
+    def shown(self) -> tuple[int, ...]:
+        """The places of the columns that are shown."""
+        return tuple(place for place, column in enumerate(self.columns) if column.shown)
 
     @property
     def overall(self) -> tuple[Block, ...]:

@@ -10,7 +10,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from dikbench.arrays import Array, Indices
-from dikbench.problem.progress import DWELL_SPEED_M_S
 from dikbench.scenario.reference.reference import Reference
 
 CHORD_ERROR_M: Final = 1e-6
@@ -34,20 +33,11 @@ class ReferencePath:
     """The path of a reference's origin from the first nominal time to the last.
 
     Attributes:
-        times: nominal times of its samples, increasing, (f,) [s].
-        arcs: path length from the start to each sample, (f,) [m].
-        moving_times: nominal time until each sample without that in which the reference is slower
-            than 1e-4 m/s, (f,) [s].
         vertices: ends of the straight pieces, (k + 1, 3) [m].
-        vertex_arcs: path length to them, increasing, (k + 1,) [m].
         once: number of pieces of the path as a set; a periodic path repeats these.
     """
 
-    times: Array
-    arcs: Array
-    moving_times: Array
     vertices: Array
-    vertex_arcs: Array
     once: int
 
     @property
@@ -113,26 +103,23 @@ class ReferencePath:
         return share, np.einsum("...i,...i->...", away, away)
 
 
-def reference_path(reference: Reference, end: float, dt: float) -> ReferencePath:
-    """Compute the path of a moving reference up to a nominal time [s], sampled at dt [s] or finer.
+def reference_path(reference: Reference, dt: float) -> ReferencePath:
+    """Compute the path of a moving reference, sampled at dt [s] or finer.
 
     Pieces are as long as `CHORD_ERROR_M` and `LONGEST_PIECE_M` allow.
     """
-    times, points = _samples(reference, end, dt)
+    times, points = _samples(reference, dt)
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     arcs = np.concatenate([[0.0], np.cumsum(steps)])
-    spans = np.diff(times)
-    moving = np.where(steps > DWELL_SPEED_M_S * spans, spans, 0.0)
-    moving_times = np.concatenate([[0.0], np.cumsum(moving)])
     kept = _simplified(points, steps, arcs)
-    vertex_arcs = arcs[kept]
     lap = np.interp(reference.first_lap + reference.period, times, arcs)
-    once = max(1, min(int(np.searchsorted(vertex_arcs, lap)), len(kept) - 1))
-    return ReferencePath(times, arcs, moving_times, points[kept], vertex_arcs, once)
+    once = max(1, min(int(np.searchsorted(arcs[kept], lap)), len(kept) - 1))
+    return ReferencePath(points[kept], once)
 
 
-def _samples(reference: Reference, end: float, dt: float) -> tuple[Array, Array]:
+def _samples(reference: Reference, dt: float) -> tuple[Array, Array]:
     """Sample times (f,) [s] and points (f, 3) [m], so that chords are within `CHORD_ERROR_M`."""
+    end = reference.duration
 
     def at(times: Array) -> Array:
         points = [reference.placement(tau).translation for tau in times.tolist()]

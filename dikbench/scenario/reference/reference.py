@@ -19,7 +19,7 @@ from dikbench.robots.robot import Robot
 class Reference:
     """A path of the task frame, parametrised by nominal time tau in [0, duration] [s].
 
-    A time-indexed run has tau = t; a path-indexed one advances tau by the progress achieved.
+    A time-indexed run has tau = t; in a path-indexed one tau waits for the robot.
 
     Attributes:
         duration: nominal time from end to end [s]; a target at rest has no path and is held until

@@ -12,6 +12,15 @@ from dikbench.programs.quadratic_program import QuadraticProgram
 LINPROG_INFEASIBLE: Final = 2
 
 
+def is_finite(program: QuadraticProgram) -> bool:
+    """Whether matrices and right-hand sides are numbers; h and bounds may be infinite."""
+    numbers = (program.P, program.q, program.G, program.A, program.b)
+    sides = (program.h, program.lb, program.ub)
+    return all(part is None or bool(np.isfinite(part).all()) for part in numbers) and not any(
+        part is not None and bool(np.isnan(part).any()) for part in sides
+    )
+
+
 def is_feasible(program: QuadraticProgram) -> bool:
     """Say whether HiGHS' simplex method finds no contradiction (feasibility tolerance 1e-7)."""
     n = len(program.q)

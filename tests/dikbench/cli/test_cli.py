@@ -124,7 +124,7 @@ SHOWN = {
     "saturating": "Clips each joint",
     "oracle": "the exact joint motion",
     "panda": "panda_hand_tcp",
-    "off_course_max_rad": "unit: rad",
+    "direction_error_max_rad": "unit: rad",
     "quick": "[[cells]]",
 }
 

@@ -20,11 +20,16 @@ from dikbench.scenario.certificate import Certificate
 from dikbench.scenario.reference.curves import circle, lemniscate
 from dikbench.scenario.reference.path import ReferencePath, reference_path
 from dikbench.scenario.reference.reference import Reference, target_at_rest
+from dikbench.simulation.clock import ReferenceMode
 from dikbench.simulation.trace import Trace
 
 DT = 0.01
 ROBOT = load_robot("panda")
 PERIOD = 2.0
+TOLERANCE = 5e-3
+ROUND_TWICE = 0.4 * math.pi
+SAMPLE_S = DT / 4
+"""A path is sampled so often, and a lag is a multiple of it."""
 
 Place = Callable[[float], Array]
 
@@ -70,6 +75,7 @@ def of(
     """The motion of a frame that is at place(t) at the trace time t; 0.01 s per step."""
     n = round(reference.duration / DT)
     t = DT * np.arange(n + 1.0)
+    mode: ReferenceMode = "time" if tau is None else "path"
     tau = t if tau is None else tau
     translations = np.array([place(time) for time in t])
     targets = np.array([reference.placement(each).translation for each in tau.tolist()])
@@ -77,7 +83,7 @@ def of(
     rows = 6 if tracking is None else 3
     trace = Trace(
         DT, np.tile(ROBOT.q0, (n + 1, 1)), tau, np.zeros((n, rows)), v, v, steps, steps, steps - 1,
-        steps - 1, np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n),
+        steps - 1, np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), mode,
     )  # fmt: skip
     scenario = Scenario(
         ROBOT, ROBOT.q0, v[0], reference, tracking or PoseTask(), DT, reference.duration,
@@ -87,7 +93,9 @@ def of(
     if tracking is not None:
         position = np.full(n + 1, np.nan)
     jacobians = np.tile(np.eye(rows, 7), (n + 1, 1, 1))
-    return Motion(trace, scenario, translations, position, np.zeros(n + 1), jacobians)
+    turned = np.array([reference.placement(each).rotation for each in tau.tolist()])
+    x, x_d = (scenario.embedding.points(turned, p) for p in (translations, targets))
+    return Motion(trace, scenario, translations, position, np.zeros(n + 1), jacobians, x, x_d)
 
 
 def on(reference: Reference, delay: float = 0.0, shift: Array | None = None) -> Place:
@@ -99,18 +107,23 @@ def on(reference: Reference, delay: float = 0.0, shift: Array | None = None) -> 
 def test_the_share_of_the_path_that_is_done() -> None:
     """Of a line of 2 s: 0.5 s late a quarter is left; of two laps at rest from 1.5 s on 5/8 is.
 
-    Shifted sideways all is done; on a way back as long as the way out the half is not the whole.
+    Less the tolerance of 5 mm. Shifted sideways all is done; on a way back as long as the way out
+    the half is not the whole.
     """
 
     def done(reference: Reference, place: Place) -> float:
         return evaluate(of(reference, place))["path_done_share"]
 
-    assert done(straight(), on(straight(), 0.5)) == pytest.approx(0.75, abs=1e-6)
+    assert done(straight(), on(straight(), 0.5)) == pytest.approx(
+        0.75 + TOLERANCE / 0.6, abs=1.3e-3
+    )
     assert done(straight(), on(straight(), shift=np.array([0, 3e-3, 0]))) == pytest.approx(1.0)
     rests = on(ROUND)
-    assert done(ROUND, lambda t: rests(min(t, 1.5))) == pytest.approx(3 / 8, abs=1e-4)
+    assert done(ROUND, lambda t: rests(min(t, 1.5))) == pytest.approx(
+        3 / 8 + TOLERANCE / ROUND_TWICE, abs=1.3e-3
+    )
     back = on(back_and_forth())
-    assert done(back_and_forth(), lambda t: back(min(t, 2.0))) == pytest.approx(0.5, abs=1e-4)
+    assert done(back_and_forth(), lambda t: back(min(t, 2.0))) == pytest.approx(0.505, abs=1.3e-3)
     assert done(back_and_forth(), back) == pytest.approx(1.0, abs=1e-4)
     turned = of(straight(), on(straight()), tracking=OrientationTask())
     assert math.isnan(evaluate(turned)["path_done_share"])
@@ -121,11 +134,14 @@ def test_the_share_of_the_path_that_is_done() -> None:
 def test_a_frame_that_is_late_on_the_path_has_lag_and_no_contour_error(
     reference: Reference, delay: float
 ) -> None:
-    """The lag is the delay, wherever a sample falls; the path's own pieces are within a micron."""
+    """The lag is the delay less the time of the tolerance; pieces are within a micron."""
     got = evaluate(of(reference, on(reference, delay)))
-    assert got["lag_max_s"] == pytest.approx(delay, abs=1e-4)
-    assert got["lag_final_s"] == pytest.approx(delay, abs=1e-4)
+    speed = float(np.linalg.norm(reference.velocity(reference.duration - delay)[:3]))
+    expected = max(delay - TOLERANCE / speed, 0.0)
+    assert got["lag_final_s"] == pytest.approx(expected, abs=2 * SAMPLE_S)
+    assert expected - 2 * SAMPLE_S <= got["lag_max_s"] <= delay
     assert got["contour_error_max_m"] < 2e-6
+    assert got["contour_error_6d_max_m"] < 1e-5
     assert delay == 0.0 or got["position_error_max_m"] > 0.02
 
 
@@ -155,7 +171,8 @@ def test_off_the_path_and_late_are_distinguished_in_one_motion() -> None:
     """0.1 s late and 3 mm to the side: both, each at its value; the quantile is the 95th."""
     got = evaluate(of(straight(), on(straight(), 0.1, np.array([0.0, 0.0, 3e-3]))))
     assert got["contour_error_max_m"] == pytest.approx(3e-3, abs=1e-9)
-    assert got["lag_final_s"] == pytest.approx(0.1, abs=1e-9)
+    # Within 5 mm of a sample, 3 mm to the side, it is from 4 mm before it on.
+    assert got["lag_final_s"] == pytest.approx(0.1 - 4e-3 / 0.3, abs=1.1 * SAMPLE_S)
     # 200 steps, the excursion rising from 0 to 2 cm: of 201 samples the quantile is the 190th step.
     rising = evaluate(of(straight(), lambda t: np.array([0.3 * t, 0.01 * t, 0.0])))
     assert rising["contour_error_p95_m"] == pytest.approx(0.019, abs=1e-9)
@@ -175,7 +192,8 @@ def test_a_frame_that_rests_while_the_target_laps_it_is_late_by_laps(point: floa
     """It stops on the circle, and nearest points of the next laps are not taken for its own."""
     stop = ROUND.placement(point).translation
     got = evaluate(of(ROUND, lambda t: ROUND.placement(t).translation if t < point else stop))
-    assert got["lag_final_s"] == pytest.approx(2 * PERIOD - point, abs=1e-3)
+    near = TOLERANCE / (0.1 * math.pi)
+    assert got["lag_final_s"] == pytest.approx(2 * PERIOD - point - near, abs=1.1 * SAMPLE_S)
     assert got["contour_error_max_m"] < 2e-6
 
 
@@ -183,12 +201,14 @@ def test_a_crossing_does_not_lead_onto_the_other_branch() -> None:
     """Late by more than half a figure of eight, past its middle: still on its own branch."""
     delay = 0.6 * PERIOD
     shifted = of(EIGHT, on(EIGHT, delay, np.array([5e-4, 0.0, 0.0])))
-    assert evaluate(shifted)["lag_max_s"] == pytest.approx(delay, abs=1e-3)
-    assert np.all(np.diff(shifted.lag) < DT + 1e-9)
+    assert delay - 0.03 < evaluate(shifted)["lag_max_s"] <= delay
+    along = shifted.along_path
+    assert along is not None
+    assert np.all(np.diff(along.lag) < DT + 1e-9)
 
 
 def test_a_way_back_that_begins_too_early_is_found() -> None:
-    """The frame turns 2 cm before the end of its line, and is on the way back when it is there."""
+    """The frame turns 2 cm before the end of its line: no more is covered within less."""
     turn = 0.48
 
     def place(t: float) -> Array:
@@ -197,9 +217,8 @@ def test_a_way_back_that_begins_too_early_is_found() -> None:
 
     got = evaluate(of(back_and_forth(), place))
     assert got["contour_error_max_m"] < 1e-9
-    # On the way back it is ahead of the target, and waits for nobody.
-    assert got["lag_final_s"] == pytest.approx(0.0, abs=1e-3)
-    assert got["lag_max_s"] < 0.25
+    assert got["path_done_share"] == pytest.approx(turn + TOLERANCE, abs=1.3e-3)
+    assert got["path_done_99_tolerance_m"] == pytest.approx(0.5 - turn, abs=1.3e-3)
 
 
 def test_a_frame_that_is_pushed_back_falls_behind_and_its_nearest_point_stays() -> None:
@@ -209,31 +228,34 @@ def test_a_frame_that_is_pushed_back_falls_behind_and_its_nearest_point_stays() 
         return np.array([0.3 * min(t, 1.0) - 0.15 * max(t - 1.0, 0.0), 0.0, 0.0])
 
     got = evaluate(of(straight(), place))
-    assert got["lag_final_s"] == pytest.approx(1.0, abs=1e-9)
+    # The target leaves as the frame turns: of 5 mm it is given those that are there in a period.
+    assert got["lag_final_s"] == pytest.approx(0.99, abs=1.1 * SAMPLE_S)
     assert got["contour_error_max_m"] < 1e-9
 
 
 def test_a_dwell_is_no_delay() -> None:
-    """1 mm short of where the target rests, the frame is late by the time of a millimetre."""
+    """Short of where the target rests, but within the tolerance, the frame is not late there."""
     reference = with_dwell()
 
     def place(t: float) -> Array:
         x = reference.placement(t).translation[0]
         return np.array([min(x, 0.299), 0.0, 0.0])
 
-    motion = of(reference, place)
-    assert motion.lag[150] == pytest.approx(1e-3 / 0.3, abs=1e-6)
-    assert motion.lag[-1] == pytest.approx(0.301 / 0.3, abs=1e-6)
+    along = of(reference, place).along_path
+    assert along is not None
+    assert along.lag[150] == 0.0
+    assert along.lag[-1] == pytest.approx((0.301 - TOLERANCE) / 0.3, abs=1.1 * SAMPLE_S)
 
 
 def test_a_target_that_waits_is_late_itself() -> None:
-    """In a path-indexed run that makes half the way per step, the delay is that of the target."""
+    """A path-indexed run that makes half the way per step does not come to the end in time."""
     tau = 0.5 * DT * np.arange(201.0)
     motion = of(straight(), lambda t: np.array([0.15 * t, 0.0, 0.0]), tau)
     got = evaluate(motion)
     assert got["position_error_max_m"] == pytest.approx(0.0, abs=1e-12)
-    assert got["lag_final_s"] == pytest.approx(1.0, abs=1e-9)
-    assert got["lag_max_s"] == pytest.approx(1.0, abs=1e-9)
+    assert math.isnan(got["lag_final_s"])
+    assert got["slow_down"] == math.inf
+    assert got["path_done_share"] == pytest.approx(0.5 + TOLERANCE / 0.6, abs=1.3e-3)
 
 
 def test_a_target_at_rest_has_itself_for_a_path_and_nothing_to_be_late_on() -> None:
@@ -245,8 +267,8 @@ def test_a_target_at_rest_has_itself_for_a_path_and_nothing_to_be_late_on() -> N
     assert math.isnan(got["lag_final_s"])
 
 
-def test_a_rotation_in_place_has_a_point_for_a_path() -> None:
-    """The distance from it is the contour error; there is no way to be late on."""
+def test_a_rotation_in_place_is_a_path_of_orientations() -> None:
+    """A turn of 1 rad that the frame makes as well, but on its way elsewhere, 0.2 m in all."""
     turning = Reference(
         1.0,
         lambda tau: pin.SE3(pin.utils.rotate("z", tau), np.zeros(3)),
@@ -254,13 +276,16 @@ def test_a_rotation_in_place_has_a_point_for_a_path() -> None:
     )
     got = evaluate(of(turning, lambda t: np.array([0.0, 0.2 * t, 0.0])))
     assert got["contour_error_max_m"] == pytest.approx(0.2)
-    assert math.isnan(got["lag_max_s"])
+    assert got["contour_error_6d_max_m"] == pytest.approx(0.2, abs=1e-6)
+    assert got["lag_final_s"] > 0.9
 
 
 def test_an_orientation_task_has_neither() -> None:
     """Where the origin is does not matter to it."""
     got = evaluate(of(straight(), on(straight(), 0.1), tracking=OrientationTask()))
-    assert all(math.isnan(value) for name, value in got.items() if "contour" in name)
+    of_position = [name for name in got if "contour" in name and "6d" not in name]
+    assert all(math.isnan(got[name]) for name in of_position)
+    assert got["contour_error_6d_max_m"] == pytest.approx(0.0, abs=1e-9)
     assert math.isnan(got["lag_max_s"])
 
 
@@ -278,7 +303,7 @@ def test_distances_are_the_least_over_the_curve(seed: int) -> None:
         lambda tau: np.zeros(6),
     )
     for reference in (ROUND, EIGHT, polygon):
-        path = reference_path(reference, reference.duration, DT)
+        path = reference_path(reference, DT)
         points = np.array(
             [reference.placement(tau).translation for tau in random.uniform(0, 4, 12)]
         )
@@ -292,8 +317,7 @@ def test_the_nearest_piece_may_end_farther_away_than_many_vertices() -> None:
     """The middle of a long piece, 1 mm away, among short ones at more than 1.2 mm."""
     short = np.array([[0.0, 2.2e-3 + 1e-5 * k, 0.0] for k in range(40)])
     vertices = np.vstack([[[-2.5e-3, 0, 0], [2.5e-3, 0, 0]], short])
-    arcs = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(vertices, axis=0), axis=1)))
-    path = ReferencePath(arcs, arcs, arcs, vertices, arcs, len(vertices) - 1)
+    path = ReferencePath(vertices, len(vertices) - 1)
     assert path.distances(np.array([[-5e-4, 1e-3, 0.0]])) == pytest.approx(1e-3, abs=1e-12)
 
 
@@ -337,4 +361,10 @@ def test_the_lag_does_not_depend_on_how_finely_the_run_is_sampled() -> None:
     """A run of 5000 steps, of which only some are looked at closely, has every step's lag."""
     slow = straight(50.0, 0.012)
     motion = of(slow, on(slow, 0.1))
-    np.testing.assert_allclose(motion.lag[10:], 0.1, atol=1e-6)
+    assert motion.along_path is not None
+    # Of 5000 steps 8000 samples are taken, 6.25 ms apart; 5 mm are done in 0.42 s.
+    np.testing.assert_array_equal(motion.along_path.lag, 0.0)
+    later = of(slow, on(slow, 0.6)).along_path
+    assert later is not None
+    expected = 0.6 - TOLERANCE / 0.012
+    np.testing.assert_allclose(later.lag[70:], expected, atol=6.25e-3 + DT)

@@ -158,7 +158,8 @@ def test_a_robot_at_rest_is_smooth_and_late() -> None:
     assert got["energy_above_10_hz_share"] == 0.0
     assert math.isnan(got["jerk_rms_scaled"])
     assert math.isnan(got["sparc"])
-    assert got["lag_final_s"] == pytest.approx(90 * still.dt)
+    # Of the path it has what is within the tolerance of its start.
+    assert got["lag_final_s"] == pytest.approx(90 * still.dt, abs=still.dt)
     assert got["contour_error_max_m"] < 1e-9
 
 
@@ -169,7 +170,7 @@ def test_every_array_of_a_trace_is_looked_at_by_some_metric() -> None:
     known = {name: np.arange(30) / 30 for name in ("primal", "dual", "gap", "distance")}
     trace = replace(trace, **known)  # type: ignore[arg-type]
     before = evaluate(motion_of(trace, scenario))
-    for name in (field.name for field in fields(trace) if field.name != "dt"):
+    for name in (field.name for field in fields(trace) if field.name not in {"dt", "mode"}):
         changed: dict[str, Any] = {name: getattr(trace, name)[::-1] + 2}
         got = evaluate(motion_of(replace(trace, **changed), scenario))
         same = np.array_equal([*got.values()], [*before.values()], equal_nan=True)

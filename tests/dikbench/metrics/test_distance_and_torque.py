@@ -36,7 +36,20 @@ def values(robot: Robot, speeds: list[float], *constraints: Constraint) -> dict[
     none, nothing = np.zeros(n, dtype=int), np.zeros(n)
     wanted = np.zeros((n, len(robot.task_rows)))
     trace = Trace(
-        DT, q, DT * np.arange(n + 1.0), wanted, v, v, none, none, none, none, *[nothing] * 4
+        DT,
+        q,
+        DT * np.arange(n + 1.0),
+        wanted,
+        v,
+        v,
+        none,
+        none,
+        none,
+        none,
+        nothing,
+        nothing,
+        nothing,
+        nothing,
     )
     scenario = Scenario(
         robot=robot,

@@ -109,6 +109,11 @@ def _arc(magnitudes: list[float]) -> float:
 
 
 ERRORS = (0, _chord(0.1), _chord(0.1), _chord(0.2), _chord(0.2))
+ANGLES = (0, 0.1, 0.1, 0.2, 0.2)
+BOTH_ERRORS = [
+    math.hypot(error, 2 * 0.2 * math.sin(angle / 2))
+    for error, angle in zip(ERRORS, ANGLES, strict=True)
+]
 
 
 @pytest.mark.parametrize(
@@ -124,7 +129,23 @@ ERRORS = (0, _chord(0.1), _chord(0.1), _chord(0.2), _chord(0.2))
         ("orientation_error_final_rad", 0.2),
         ("second_task_error_rms", _rms(0, *(ELBOW * _chord(a) for a in (0.1, 0.1, 0.2, 0.2)))),
         ("second_task_error_final", ELBOW * _chord(0.2)),
+        ("tracking_error_6d_rms_m", _rms(*BOTH_ERRORS)),
+        ("tracking_error_6d_p95_m", BOTH_ERRORS[-1]),
+        ("tracking_error_6d_max_m", BOTH_ERRORS[-1]),
+        ("tracking_error_6d_final_m", BOTH_ERRORS[-1]),
         # A target at rest has no path but itself.
+        ("contour_error_6d_rms_m", _rms(*BOTH_ERRORS)),
+        ("contour_error_6d_p95_m", BOTH_ERRORS[-1]),
+        ("contour_error_6d_max_m", BOTH_ERRORS[-1]),
+        ("contour_error_6d_final_m", BOTH_ERRORS[-1]),
+        ("path_done_99_tolerance_m", math.nan),
+        ("path_done_90_tolerance_m", math.nan),
+        ("lag_tolerance_m", math.nan),
+        ("slow_down", math.nan),
+        ("course_rad", math.nan),
+        # Only one change of velocity, by -3 rad/s in 0.1 s, is above 20 rad/s^2.
+        ("chatter_share", 0.0),
+        ("chatter_steps", 0.0),
         ("contour_error_rms_m", _rms(*ERRORS)),
         ("contour_error_p95_m", _chord(0.2)),
         ("contour_error_max_m", _chord(0.2)),
@@ -135,7 +156,7 @@ ERRORS = (0, _chord(0.1), _chord(0.1), _chord(0.2), _chord(0.2))
         ("null_space_drift_per_lap_rad", math.nan),
         ("recovery_time_s", math.inf),
         ("path_length_m", 2 * _chord(0.1) + _chord(0.2)),
-        ("off_course_max_rad", math.pi),
+        ("direction_error_max_rad", math.pi),
         ("progress_mean", (1.0 - 2.0 + 0.5 + 0.0) / 4),
         ("progress_min", -2.0),
         ("velocity_peak_ratio", 2.0 / 1.5),
@@ -194,7 +215,7 @@ def test_a_slant_of_the_motion_is_its_largest_angle() -> None:
     # Achieved (0.4, 0.5, 1), weighted (0.4, 0.5, 0.2); wanted the translation alone.
     trace = _trace([1.0, 1.0], [[0.4, 0.5, 0.0], [0.4, 0.5, 1.0]], [Status.OK, Status.OK])
     got = evaluate(motion_of(trace, _scenario()))
-    assert got["off_course_max_rad"] == pytest.approx(math.acos(math.sqrt(0.41 / 0.45)))
+    assert got["direction_error_max_rad"] == pytest.approx(math.acos(math.sqrt(0.41 / 0.45)))
     assert got["progress_min"] == pytest.approx(1.0)
     assert got["stuck_share"] == 0.0
 
@@ -281,6 +302,11 @@ def test_a_start_outside_a_limit_is_not_a_step_that_violates_it() -> None:
 
 NEED_MORE = {
     "path_done_share": "a path",
+    "path_done_99_tolerance_m": "a path",
+    "path_done_90_tolerance_m": "a path",
+    "lag_tolerance_m": "a path",
+    "slow_down": "a path that waits",
+    "course_rad": "a path",
     "lag_max_s": "a path",
     "lag_final_s": "a path",
     "null_space_drift_per_lap_rad": "a lap",
@@ -304,9 +330,9 @@ def test_no_step_leaves_what_it_cannot_define() -> None:
     got = evaluate(motion_of(trace, _scenario()))
     assert list(got) == list(METRICS)
     for name, value in got.items():
-        defined = "error" in name or name in {
+        defined = ("error" in name and "direction" not in name) or name in {
             "joint_travel_rad", "sigma_min", "position_violation_max_rad", "path_length_m",
-            "fallback_steps", "relaxed_steps", "acceleration_variation_rad_s2"
+            "fallback_steps", "relaxed_steps", "chatter_steps", "acceleration_variation_rad_s2"
         } or "integral" in name  # fmt: skip
         assert math.isnan(value) != defined, name
     assert got["position_error_max_m"] == pytest.approx(0.0, abs=1e-12)
@@ -319,7 +345,7 @@ def test_a_run_that_only_dwells_has_no_progress() -> None:
     got = evaluate(motion_of(trace, _scenario()))
     assert math.isnan(got["progress_mean"])
     assert math.isnan(got["progress_min"])
-    assert math.isnan(got["off_course_max_rad"])
+    assert math.isnan(got["direction_error_max_rad"])
 
 
 def test_a_run_that_stands_still_makes_no_progress() -> None:
@@ -327,7 +353,7 @@ def test_a_run_that_stands_still_makes_no_progress() -> None:
     trace = _trace([0.0, 0.0], [[0.4, 0.5, 1.0]] * 2, [Status.STUCK] * 2)
     got = evaluate(motion_of(trace, _scenario()))
     assert got["progress_mean"] == 0.0
-    assert math.isnan(got["off_course_max_rad"])
+    assert math.isnan(got["direction_error_max_rad"])
     assert got["stuck_share"] == 1.0
 
 

@@ -34,7 +34,9 @@ def drift(scenario: Scenario, v: Array, tau: Array | None = None) -> float:
         dt, np.array(q), times, v, v, v, none, none, none, none, nothing, nothing, nothing, nothing
     )
     nowhere = np.zeros(n + 1)
-    motion = Motion(trace, scenario, np.zeros((n + 1, 3)), nowhere, nowhere, nowhere)
+    motion = Motion(
+        trace, scenario, np.zeros((n + 1, 3)), nowhere, nowhere, nowhere, nowhere, nowhere
+    )
     return METRICS["null_space_drift_per_lap_rad"].of(motion)
 
 

@@ -16,7 +16,7 @@ def motion_at(heights: list[float]) -> Motion:
     """A motion of which nothing is known but the heights of the task frame [m]."""
     nothing = cast(Any, None)
     translations = np.array([[0.0, 0.0, height] for height in heights]).reshape(-1, 3)
-    return Motion(nothing, nothing, translations, nothing, nothing, nothing)
+    return Motion(nothing, nothing, translations, nothing, nothing, nothing, nothing, nothing)
 
 
 def height(motion: Motion) -> Array:

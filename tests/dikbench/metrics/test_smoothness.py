@@ -38,7 +38,16 @@ def of(name: str, v: Array, dt: float, start: float = 0.0) -> float:
     )  # fmt: skip
     nowhere = np.zeros(n + 1)
     return METRICS[name].of(
-        Motion(trace, scenario, np.zeros((n + 1, 3)), nowhere, nowhere, np.zeros((n + 1, 3, 3)))
+        Motion(
+            trace,
+            scenario,
+            np.zeros((n + 1, 3)),
+            nowhere,
+            nowhere,
+            np.zeros((n + 1, 3, 3)),
+            nowhere,
+            nowhere,
+        )
     )
 
 

@@ -34,7 +34,7 @@ def test_the_oracle_tracks_exactly_at_the_price_it_was_built_with() -> None:
     assert row["status"] == "ok"
     assert row["position_error_max_m"] < 1e-9
     assert row["orientation_error_max_rad"] < 1e-9
-    assert row["off_course_max_rad"] < 0.06
+    assert row["direction_error_max_rad"] < 0.06
     assert row["progress_min"] > 0.98
     motion = make_scenario(name).motion
     assert motion is not None

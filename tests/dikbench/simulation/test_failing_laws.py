@@ -19,7 +19,9 @@ from makers.scenarios import RATE, at_step, exact, planar_scenario, raises, run_
 
 from dikbench.arrays import Array
 from dikbench.errors import Infeasible, SolverFailed
+from dikbench.linear_algebra import shortest
 from dikbench.problem import DikProblem, Solve
+from dikbench.problem.velocity_box import velocity_box
 from dikbench.programs.answer import Answer
 from dikbench.programs.quadratic_program import ProgramKind, QuadraticProgram
 from dikbench.robots.catalogue import load_robot
@@ -289,6 +291,54 @@ def test_the_fallback_keeps_rows_that_going_on_would_keep(
     v = fallback(problem)
     assert np.all(G @ v <= problem.h + 1e-9)
     assert np.abs(v).max() < 1e-6 or np.any(G @ (0.99 * v) > problem.h)
+
+
+@settings(deadline=None)
+@given(
+    v_prev=arrays(float, 3, elements=st.floats(-2, 2)),
+    G=arrays(float, (6, 3), elements=st.floats(-1, 1)),
+    inside=arrays(float, 3, elements=st.floats(0, 1)),
+    room=arrays(float, 6, elements=st.floats(1e-3, 0.5)),
+    margin=st.floats(-0.01, 0.5),
+)
+def test_the_fallback_keeps_rows_and_box_wherever_both_can_be_kept(
+    v_prev: Array, G: Array, inside: Array, room: Array, margin: float
+) -> None:
+    """Near a position limit, outside it, under acceleration limits: some velocity keeps all."""
+    upper = np.add(load_robot("planar3r").q0, [margin, 0.5, 2.0])
+    problem = _problem(v_prev, position=(-4.0, upper), acceleration=5.0)
+    box = velocity_box(problem.limits, v_prev, problem.dt)
+    G = G / np.maximum(1e-3, np.linalg.norm(G, axis=1, keepdims=True))
+    problem.G, problem.h = G, G @ (box.lower + inside * (box.upper - box.lower)) + room
+    v = fallback(problem)
+    assert np.all((box.lower <= v) & (v <= box.upper))
+    assert np.all(G @ v <= problem.h + 1e-7)
+
+
+def test_the_fallback_keeps_the_joints_limits_where_rows_contradict_each_other() -> None:
+    """No velocity is above 1 and below -1: the rows are broken, the box is not."""
+    problem = _problem(np.array([0.5, 0.0, 0.0]))
+    problem.G, problem.h = np.array([[1.0, 0, 0], [-1.0, 0, 0]]), np.array([-1.0, -1.0])
+    v, box = fallback(problem), problem.box()
+    assert np.all((box.lower <= v) & (v <= box.upper))
+
+
+@settings(deadline=None)
+@given(
+    G=arrays(float, (5, 3), elements=st.floats(-1, 1)),
+    point=arrays(float, 3, elements=st.floats(-1, 1)),
+    others=arrays(float, (20, 3), elements=st.floats(-1, 1)),
+)
+def test_the_shortest_point_is_inside_and_none_is_shorter(
+    G: Array, point: Array, others: Array
+) -> None:
+    """Of those with G x <= h; by the angle that every other one makes with it."""
+    h = G @ point
+    x = shortest(G, h)
+    assert x is not None
+    assert np.all(G @ x <= h + 1e-7)
+    allowed = [y for y in [point, *others] if np.all(G @ y <= h)]
+    assert all(float(x @ (y - x)) >= -1e-6 for y in allowed)
 
 
 def test_the_fallback_brings_a_robot_to_rest() -> None:

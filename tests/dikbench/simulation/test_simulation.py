@@ -22,7 +22,6 @@ from dikbench.problem import DikProblem
 from dikbench.problem.tasks import PostureTask
 from dikbench.scenario import Scenario
 from dikbench.scenario.plant import Ideal, Saturating
-from dikbench.simulation.clock import LONGEST_PATH_RUN_DURATIONS
 from dikbench.simulation.closed_loop import Run, simulate
 from dikbench.simulation.status import STEP_CODE, Status
 from dikbench.simulation.trace import Trace
@@ -72,27 +71,31 @@ def test_a_path_indexed_run_ends_with_the_path() -> None:
 
 @pytest.mark.parametrize("share", [0.5, 0.25])
 def test_a_path_indexed_reference_waits_for_a_slow_law(share: float) -> None:
-    """At a share of the speed it moves on by that share, and takes as much longer."""
+    """At a share of the speed it never gets away by more than a period, and takes as much longer.
+
+    The twist that is wanted grows with what is left to do, so that the law is a little faster.
+    """
     run = run_on_planar(lambda problem: share * exact(problem), mode="path")
-    assert run.trace.steps == pytest.approx(30 / share, abs=2)
-    assert np.diff(run.trace.tau) == pytest.approx(0.01 * share)
+    assert 26 / share < run.trace.steps <= 30 / share
+    moved = np.diff(run.trace.tau)
+    assert np.all((moved > 0) & (moved < 0.01 + 1e-12))
 
 
 def test_a_path_indexed_reference_does_not_run_ahead_or_back() -> None:
-    """Twice the wanted speed is full progress, a reversal is none."""
+    """Twice the wanted speed is full progress, a reversal none after the first period."""
     fast = run_on_planar(lambda problem: 2 * exact(problem), mode="path")
     assert np.diff(fast.trace.tau) == pytest.approx(0.01)
     back = run_on_planar(lambda problem: -0.01 * exact(problem), mode="path")
-    assert np.all(back.trace.tau == 0)
+    assert back.trace.tau[0] == 0
+    assert back.trace.tau[1:] == pytest.approx(0.01, abs=1e-4)
 
 
 def test_a_path_indexed_run_gives_up_after_five_times_its_duration() -> None:
     """A law that stands still is not waited for for ever; the trial is ok, its steps are stuck."""
     run = run_on_planar(lambda problem: np.zeros(3), mode="path")
-    assert LONGEST_PATH_RUN_DURATIONS == 5
     assert run.status is Status.OK
     assert run.trace.steps == 150
-    assert np.all(run.trace.tau == 0)
+    assert run.trace.tau[1:] == pytest.approx(0.01)
     assert run.trace.share(Status.STUCK) == 1.0
 
 
@@ -351,7 +354,7 @@ def test_what_is_no_trace_is_refused(tmp_path: Path) -> None:
     _assert_refused(path)
 
 
-@pytest.mark.parametrize("missing", [field.name for field in fields(Trace)])
+@pytest.mark.parametrize("missing", [field.name for field in fields(Trace) if field.name != "mode"])
 def test_a_table_that_lacks_something_is_refused(tmp_path: Path, missing: str) -> None:
     """An Arrow file without one of the columns, or without the period, is no trace."""
     path = tmp_path / "trace.arrow"

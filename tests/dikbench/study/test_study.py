@@ -85,7 +85,7 @@ def test_a_formulation_alone_gets_the_default_solver() -> None:
     """Without a study and a solver, a law runs with the default solver of its kind of program."""
     chosen = Selection(formulations=("qp[damping=0.1]", "lp-alpha-cvxpy"))
     assert solvers_of(select(load_study("quick"), chosen, named=False)) == {
-        "qp[damping=0.1]": ["daqp"],
+        "qp[damping=0.1]": ["daqp[then=clarabel]"],
         "lp-alpha-cvxpy": ["clarabel"],
     }
 

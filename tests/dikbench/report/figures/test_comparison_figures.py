@@ -39,7 +39,7 @@ def test_points_of_off_course_and_slow_down(drawn: list[Any], target: Path) -> N
     trials["progress_mean"] = contender.map(
         {"slow": 0.5, "wide": 1.0, "both": 0.4, "violating": 1.0, "slower": 0.1}
     )
-    trials["off_course_max_rad"] = np.radians(
+    trials["direction_error_max_rad"] = np.radians(
         contender.map({"slow": 1e-9, "wide": 90.0, "both": 90.0, "violating": 0.0, "slower": 0.0})
     )
     trials["violating_share"] = contender.eq("violating") * 0.1
@@ -58,7 +58,7 @@ def test_points_of_off_course_and_slow_down(drawn: list[Any], target: Path) -> N
 
 def test_a_failed_trial_counts_worst() -> None:
     """A trial that failed is 180 deg off course and makes none of the motion."""
-    trials = random_rows(["dls"], SCENARIOS).assign(off_course_max_rad=0.0, progress_mean=1.0)
+    trials = random_rows(["dls"], SCENARIOS).assign(direction_error_max_rad=0.0, progress_mean=1.0)
     trials.loc[0, "status"] = "diverged"
     points = contender_points(trials)
     assert points.loc["dls", "off_course"] == 60.0

@@ -60,7 +60,7 @@ def test_the_worst_that_applies_is_the_outcome() -> None:
     trials = random_rows(["dls"], GRID)
     trials["status"] = ["crashed", *["ok"] * 5]
     trials["violating_share"] = [0.5, 0.5, 0.0, 0.0, 0.0, np.nan]
-    trials["off_course_max_rad"] = [1.0, 1.0, 1.0, 0.0, 0.0, np.nan]
+    trials["direction_error_max_rad"] = [1.0, 1.0, 1.0, 0.0, 0.0, np.nan]
     trials["progress_min"] = [0.0, 0.0, 0.0, 0.5, 1.0, np.nan]
     named = [CATEGORIES[code] for code in categories(trials)]
     assert named == ["failed", "violating", "off course", "slow", "ok", "ok"]
@@ -88,7 +88,7 @@ def test_laws_stand_in_the_order_of_how_they_do(drawn: list[Any], target: Path) 
     trials = random_rows(["violating", "far", "near", "oracle"], GRID)
     formulation = trials["formulation"]
     trials["violating_share"] = formulation.eq("violating") * 1.0
-    trials["off_course_max_rad"] = 0.0
+    trials["direction_error_max_rad"] = 0.0
     trials["progress_min"] = 1.0
     trials["position_error_rms_m"] = formulation.map(
         {"violating": 0.0, "near": 1e-3, "far": 1e-2, "oracle": 1.0}

@@ -158,8 +158,8 @@ def test_who_stays_on_course_and_who_of_them_gets_on() -> None:
         {
             "exact": TOO_FAST,
             "slow": {"progress_mean": 0.4},
-            "less slow": {"progress_mean": 0.8, "off_course_max_rad": math.radians(0.9)},
-            "astray": {"off_course_max_rad": [0.0, 0.0, 1.0]},
+            "less slow": {"progress_mean": 0.8, "direction_error_max_rad": math.radians(0.9)},
+            "astray": {"direction_error_max_rad": [0.0, 0.0, 1.0]},
         },
         THREE,
     )
@@ -189,6 +189,30 @@ def test_who_fails_most() -> None:
     assert "`a` had no answer in up to 95 %" in fail_most(rows, Names(rows)).text
     rows = make_rows({"b": {}}, THREE)
     assert fail_most(rows, Names(rows)).text == "No trial failed and every step was answered."
+
+
+def test_who_fails_once_in_many_trials_is_named_alone() -> None:
+    """However small the share, of trials or of steps; who never failed is not among them."""
+    seeds = range(120)
+    rows = make_rows({"a": {}, "b": {}}, seeds=seeds)
+    rows.loc[rows["formulation"].eq("b") & rows["seed"].eq(7), "status"] = "timeout"
+    text = fail_most(rows, Names(rows)).text
+    assert text == "`b`: 0.833 % of the trials (1 trial: 1 timeout)."
+    rows = make_rows({"a": {"solver_failed_share": 0.002}, "b": {}, "c": {}}, seeds=seeds)
+    text = fail_most(rows, Names(rows)).text
+    assert "`a` had no answer in up to 0.2 % of a run's steps, and was slowed down" in text
+    rows = make_rows({"a": {"infeasible_share": 0.002}, "b": {"infeasible_share": 0.002}, "c": {}})
+    assert "`a` and `b` had no answer" in fail_most(rows, Names(rows)).text
+
+
+def test_a_skipped_trial_is_no_failure() -> None:
+    """It is neither counted as one nor among the trials."""
+    rows = make_rows(
+        {"a": {"status": ["timeout", "ok", "skipped"]}, "b": {"status": "skipped"}}, THREE
+    )
+    assert fail_most(rows, Names(rows)).text == "`a`: 50 % of the trials (1 trial: 1 timeout)."
+    rows = make_rows({"a": {"status": "skipped"}}, THREE)
+    assert fail_most(rows, Names(rows)).text == "No trial was run."
 
 
 def test_times_that_a_stable_cell_may_drift_apart_are_a_tie() -> None:

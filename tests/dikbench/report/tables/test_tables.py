@@ -26,7 +26,7 @@ Rows = list[dict[str, str]]
 INF = math.inf
 WORST = defaultdict(
     lambda: INF,
-    off_course_max_rad=math.pi,
+    direction_error_max_rad=math.pi,
     stuck_share=1.0,
     violating_share=1.0,
     infeasible_share=1.0,
@@ -196,7 +196,7 @@ def _synthetic(path: Path) -> Path:
                             "position_error_rms_m": error,
                             "position_error_max_m": 2 * error,
                             "orientation_error_rms_rad": 0.0 if contender == 0 else error,
-                            "off_course_max_rad": min(100 * error, 3.0),
+                            "direction_error_max_rad": min(100 * error, 3.0),
                             "progress_mean": 1 - 10 * error,
                             "progress_min": 1 - 90 * error,
                             "stuck_share": 0.0 if seed else error,
@@ -302,7 +302,7 @@ def test_a_law_that_fails_wins_no_average_over_the_trials_it_survived() -> None:
         status=["ok", "diverged", "ok", "ok", "ok", "ok"],
         position_error_rms_m=[1e-6, 1e-6, 0.1, 0.1, 0.3, 0.3],
         position_error_max_m=[1e-6, 1e-6, 0.1, 0.2, 0.3, 0.4],
-        off_course_max_rad=[0.0, 0.0, 2.0, 2.0, 2.5, 2.5],
+        direction_error_max_rad=[0.0, 0.0, 2.0, 2.0, 2.5, 2.5],
     )
     table = make_table(TRACKING_ERROR, trials)
     assert _best(table, "position_error_rms_m") == {"b none"}
@@ -311,10 +311,10 @@ def test_a_law_that_fails_wins_no_average_over_the_trials_it_survived() -> None:
     block = _block(table)
     assert _column(table, block, "position_error_max_m_worst")["a none"].value == INF
     # An angle has a finite worst, which carries the failure: a is compared, and wins.
-    angles = _column(table, block, "off_course_max_rad_worst")
+    angles = _column(table, block, "direction_error_max_rad_worst")
     assert angles["a none"].value == math.pi
-    assert _best(table, "off_course_max_rad_worst") == {"b none"}
-    assert _best(table, "off_course_max_rad") == {"a none"}
+    assert _best(table, "direction_error_max_rad_worst") == {"b none"}
+    assert _best(table, "direction_error_max_rad") == {"a none"}
     assert _best(table, "position_error_rms_m", family="reach") == {"a none"}
 
 
@@ -325,10 +325,14 @@ def test_a_failure_where_nothing_is_measured_does_not_disqualify_the_others() ->
         scenario=["reach", "step"] * 3,
         status=["ok", "crashed", "ok", "ok", "ok", "ok"],
         contour_error_max_m=[0.1, np.nan, 0.2, np.nan, 0.3, np.nan],
-        off_course_max_rad=[0.1, np.nan, 0.2, np.nan, 0.3, np.nan],
+        direction_error_max_rad=[0.1, np.nan, 0.2, np.nan, 0.3, np.nan],
     )
     table = make_table(TRACKING_ERROR, trials)
-    for key in ("contour_error_max_m_worst", "off_course_max_rad", "off_course_max_rad_worst"):
+    for key in (
+        "contour_error_max_m_worst",
+        "direction_error_max_rad",
+        "direction_error_max_rad_worst",
+    ):
         assert _best(table, key) == {"b none"}, key
 
 

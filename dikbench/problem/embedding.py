@@ -1,0 +1,88 @@
+"""Placements as points of a Euclidean space, in which the distance of two poses is one number."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import sqrt
+from typing import Any, Final
+
+import numpy as np
+
+from dikbench.arrays import Array
+from dikbench.problem.progress import CHARACTERISTIC_LENGTH_M
+from dikbench.problem.tasks import OrientationTask, PoseTask, PositionTask, TrackingTask
+from dikbench.robots.robot import Robot
+
+NEGLIGIBLE_WEIGHT_SHARE: Final = 1e-3
+"""A row of a task whose weight is below this share of the largest is not asked for."""
+
+FRAME_TASKS: Final = (PoseTask, PositionTask, OrientationTask)
+"""The tasks that are about the placement of a frame."""
+
+
+@dataclass(frozen=True, eq=False)
+class Embedding:
+    """Maps placements to points x so that |x(X) - x(Y)| is the distance d6 of what a task asks for.
+
+        x(X) = [P p; s vec(A R B)],   d6(X, Y) = sqrt(|dp|^2 + (2 L sin(theta/2))^2)
+
+    for a task on the whole pose, with P = A = B = I and s = L / sqrt 2. A task on the position has
+    no second part, one on the orientation no first. Where a task leaves one axis a of the target
+    free, the second part is L R a, and d6 has the angle between the two axes R a for theta. Where
+    it asks for a turn about one axis only, A and B keep the plane across it. A single linear row is
+    one along an axis of the target at its start.
+
+    Attributes:
+        linear: P, (r, 3).
+        left: A, (k, 3).
+        right: B, (3, l).
+        scale: s [m]; 0 where nothing is asked of the orientation.
+    """
+
+    linear: Array
+    left: Array
+    right: Array
+    scale: float
+
+    def points(self, rotations: Array, translations: Array) -> Array:
+        """Map n placements to points, (n, d) [m].
+
+        Args:
+            rotations: (n, 3, 3).
+            translations: (n, 3) [m].
+        """
+        parts = [translations @ self.linear.T]
+        if self.scale:
+            turned = self.left @ (rotations @ self.right)
+            parts.append(self.scale * turned.reshape(len(turned), -1))
+        points: Array = np.concatenate(parts, axis=1)
+        return points
+
+
+def embedding_of(
+    task: TrackingTask, robot: Robot, start: Any, length: float = CHARACTERISTIC_LENGTH_M
+) -> Embedding:
+    """Make the embedding of what a task on a frame asks for.
+
+    Rows are left out that the arm cannot move, and those of negligible weight.
+
+    Args:
+        task: the task.
+        robot: the robot.
+        start: rotation of the target at its start, (3, 3).
+        length: L [m], the lever that turns angles into lengths.
+    """
+    rows = np.array(task.rows(robot))
+    weights = np.broadcast_to(getattr(task, "weight", 1.0), rows.shape)
+    kept = rows[weights >= NEGLIGIBLE_WEIGHT_SHARE * weights.max()]
+    linear, angular = kept[kept < 3], kept[kept >= 3] - 3
+    identity, axes = np.eye(3), np.asarray(start)
+    P = identity if len(linear) == 3 else axes.T[linear]
+    if len(angular) == 3:
+        return Embedding(P, identity, identity, length / sqrt(2))
+    free = np.setdiff1d(np.arange(3), angular)
+    if len(angular) == 2:
+        return Embedding(P, identity, identity[:, free], length)
+    if len(angular) == 1:
+        return Embedding(P, axes.T[free], identity[:, free], length / sqrt(2))
+    return Embedding(P, identity, identity, 0.0)

@@ -1,0 +1,88 @@
+"""The solver axis: what each solver, interface and preset makes of the same formulations."""
+
+from __future__ import annotations
+
+from math import nan
+
+import pandas as pd
+
+from dikbench.report.selection.judged import judged_rows
+from dikbench.report.tables.kinds import MS, PERCENT
+from dikbench.report.tables.table import ALL, Block, Column, Table, TableCell, TableRow
+from dikbench.statistics.failures import ran
+from dikbench.statistics.success import rates, succeeded
+from dikbench.statistics.trial_matrix import CONTENDER
+from dikbench.study.trial import NO_SOLVER
+
+COLUMNS = (
+    Column("runs", "runs", "number of runs, of any plant and reference", count=True),
+    Column(
+        "success_percent",
+        "success [%]",
+        "rate of success where the path may wait (see the table of success)",
+        "high",
+    ),
+    Column(
+        "without_answer_percent",
+        "steps without an answer [%]",
+        "share of all steps in which the solver gave no answer although a feasible point exists",
+        "low",
+    ),
+    Column(
+        "not_verified_percent",
+        "steps not verified [%]",
+        "share of all steps whose answer failed the recheck by our own residuals",
+        "low",
+    ),
+    Column("residual_worst", "residual worst", "largest primal residual of all steps", "low"),
+    Column(
+        "optimum_worst", "from optimum worst [rad/s]", "largest distance from the optimum", "low"
+    ),
+    Column("median_ms", "median call [ms]", "median over scenarios of the median call", "low"),
+    Column("p99_ms", "99 % of the calls [ms]", "median over scenarios of the 99 % quantile", "low"),
+)
+
+
+def solver_axis(trials: pd.DataFrame) -> Table:
+    """Make a row per formulation and solver, of formulations that were run with a solver.
+
+    Args:
+        trials: the rows of trials.csv.
+    """
+    rows = ran(trials)
+    rows = rows[rows["solver"].ne(str(NO_SOLVER))]
+    success = {}
+    if len(rows):
+        judged = judged_rows(rows, "path")
+        if len(judged):
+            found = rates(judged, succeeded(judged))
+            names = found.contenders.itertuples(index=False, name=None)
+            success = dict(zip(names, found.rate.tolist(), strict=True))
+    made = [
+        TableRow(str(name), str(solver), _cells(part, success.get((name, solver), nan)))
+        for (name, solver), part in rows.groupby(CONTENDER, sort=False)
+    ]
+    blocks = (Block(ALL, None, None, tuple(made)),) if made else ()
+    notes = ("All runs count. Times are those of the timing pass.",)
+    return Table("solvers", "Solvers on the same formulations", COLUMNS, blocks, notes)
+
+
+def _cells(part: pd.DataFrame, success: float) -> tuple[TableCell, ...]:
+    steps = part["steps"].to_numpy(dtype=float)
+
+    def of_all_steps(column: str) -> float:
+        shares = part[column].fillna(0.0).to_numpy(dtype=float)
+        return PERCENT * float(shares @ steps / steps.sum()) if steps.sum() else nan
+
+    times = part.drop_duplicates("scenario")
+    numbers = (
+        len(part),
+        PERCENT * success,
+        of_all_steps("solver_failed_share"),
+        of_all_steps("not_verified_share"),
+        part["primal_residual_max_rad_s"].max(),
+        part["optimum_distance_max_rad_s"].max(),
+        MS * times["formulation_time_median_us"].median(),
+        MS * times["formulation_time_p99_us"].median(),
+    )
+    return tuple(TableCell(float(number)) for number in numbers)

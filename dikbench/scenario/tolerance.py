@@ -1,0 +1,51 @@
+"""The tolerance of a scenario, above what the control period takes from an exact formulation."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+import pinocchio as pin
+
+from dikbench.linear_algebra import pseudo_inverse
+from dikbench.robots.kinematics import Kinematics
+from dikbench.scenario.scenario import Scenario
+
+TOLERANCES_M: Final = (0.001, 0.002, 0.005, 0.01, 0.02)
+"""The tolerances that a scenario may have [m]."""
+
+FLOOR_FACTOR: Final = 1.5
+"""A tolerance is at least this many times what an exact formulation leaves the path by."""
+
+RCOND: Final = 1e-6
+"""Singular values below this share of the largest count as zero."""
+
+
+def tolerance_above(floor: float, default: float) -> float:
+    """Return the smallest tolerance [m] that is at least the default and 1.5 times a floor [m].
+
+    It is the largest one where none is.
+    """
+    least = max(default, FLOOR_FACTOR * floor)
+    return next((each for each in TOLERANCES_M if each >= least), TOLERANCES_M[-1])
+
+
+def sampling_floor(scenario: Scenario) -> float:
+    """Compute by how much [m] the pseudo-inverse leaves a path because it is asked in steps only.
+
+    It is the largest distance from the path of v = J^+ V (V with the correction by the gain), held
+    for a control period, without any limit.
+    """
+    robot, dt, path = scenario.robot, scenario.dt, scenario.embedded_path
+    assert path is not None
+    kinematics, q = Kinematics(robot), scenario.q0
+    rotations, translations = [], []
+    for k in range(round(scenario.reference.duration / dt) + 1):
+        kinematics.update(q)
+        placement = kinematics.placement(robot.frame_id)
+        rotations.append(placement.rotation.copy())
+        translations.append(placement.translation.copy())
+        task = scenario.first.linearize(kinematics, *scenario.target(k * dt))
+        q = pin.integrate(robot.model, q, dt * (pseudo_inverse(task.J, RCOND) @ task.V))
+    points = scenario.embedding.points(np.array(rotations), np.array(translations))
+    return float(path.nearest(points)[0].max())

@@ -1,0 +1,111 @@
+"""Who may be called first in a situation: a tie for success is not enough.
+
+A formulation is named first only if
+
+- it ran every case, and its success cannot be told apart from the best (see `rates`);
+- of all cases that ask for motion it succeeds in more than half of what the best succeeds in, and
+  it is stopped by limits that it is told of, by collisions or failures in at most 5 % of all: who
+  stands still holds a pose well, and who ignores limits is accurate where none is near;
+- no other of those is faster beyond doubt, where the path may wait.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+import pandas as pd
+
+from dikbench.arrays import Array, Mask
+from dikbench.metrics import Outcome
+from dikbench.scenario.oracle import ORACLES
+from dikbench.statistics.success import Rates, paired_means, rates, succeeded
+from dikbench.statistics.trial_matrix import CONTENDER
+
+SMALLEST_SHARE_OF_BEST: Final = 0.5
+"""Who is first somewhere has an overall rate above this share of the best one's."""
+
+MOST_BROKEN_SHARE: Final = 0.05
+"""... and breaks limits or breaks off in at most this share of the trials."""
+
+FASTER: Final = 1.05
+"""A path is done faster where its duration is smaller by more than this ratio."""
+
+BROKEN: Final = frozenset(
+    {
+        Outcome.DID_NOT_RUN.value,
+        Outcome.DIVERGED.value,
+        Outcome.COLLIDED.value,
+        Outcome.LIMIT_BROKEN.value,
+    }
+)
+"""Outcomes of trials in which a robot is stopped."""
+
+Contender = tuple[str, str]
+
+
+def dependable(trials: pd.DataFrame) -> set[Contender]:
+    """Find the formulations that may be first in a situation.
+
+    Args:
+        trials: the rows that count in a setting, of all situations.
+    """
+    moving = trials[_asks_for_motion(trials)]
+    if moving.empty:
+        return set()
+    overall = rates(moving, succeeded(moving))
+    competes = overall.whole & ~overall.contenders["formulation"].isin(ORACLES).to_numpy()
+    if not competes.any():
+        return set()
+    most = overall.rate[competes].max()
+    told = ~trials["sees_constraints"].eq(0)
+    stopped = (trials["outcome"].isin(BROKEN) & told).groupby([trials[k] for k in CONTENDER])
+    share = stopped.mean()
+    return {
+        contender
+        for contender, rate, one in zip(
+            overall.contenders.itertuples(index=False, name=None),
+            overall.rate,
+            competes,
+            strict=True,
+        )
+        if one
+        and rate > SMALLEST_SHARE_OF_BEST * most
+        and share.get(contender, 0.0) <= MOST_BROKEN_SHARE
+    }
+
+
+def first_places(part: pd.DataFrame, found: Rates, candidates: set[Contender]) -> Mask:
+    """Say who is first in a situation, (k,).
+
+    Args:
+        part: the rows of the situation that count.
+        found: their rates of success.
+        candidates: who may be first (see `dependable`).
+    """
+    contenders = list(found.contenders.itertuples(index=False, name=None))
+    may_be = np.array([contender in candidates for contender in contenders], dtype=bool)
+    first: Mask = np.asarray(found.best & may_be)
+    return first & ~_slower(part, found, first)
+
+
+def _asks_for_motion(trials: pd.DataFrame) -> pd.Series:
+    """Say which trials are of cases that standing still does not do: of others nobody learns."""
+    least = trials.groupby(["scenario", "seed"])["tracking_error_6d_max_m"].transform("min")
+    at_rest = trials["judged_by_path"].eq(0)
+    found: pd.Series = ~(at_rest & least.le(trials["tolerance_m"].astype(float)))
+    return found
+
+
+def _slower(part: pd.DataFrame, found: Rates, first: Mask) -> Mask:
+    """Say who is slower than another of the first, beyond doubt, where both succeed."""
+    slower = np.zeros(len(first), dtype=bool)
+    duration = part["slow_down"].where(succeeded(part))
+    values = np.log(duration.to_numpy(dtype=float))
+    if np.isnan(values).all():
+        return slower
+    matrix: Array = found.layout.fill(values)
+    for other in np.flatnonzero(first):
+        means, lower, _ = paired_means(matrix - matrix[:, [other]], found)
+        slower |= (lower > 0) & (means > np.log(FASTER))
+    return slower & first

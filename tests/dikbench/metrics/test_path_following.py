@@ -1,0 +1,158 @@
+"""What the measures of a path say of motions whose answer is known: the exact one, and none."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dikbench.arrays import Array
+from dikbench.metrics import METRICS, Motion, evaluate, motion_of
+from dikbench.metrics.chatter import largest_acceleration
+from dikbench.plugins.building import make_plant, make_scenario
+from dikbench.problem import DikProblem, Solve
+from dikbench.problem.problem import Formulation
+from dikbench.scenario import Scenario
+from dikbench.scenario.reference.embedded_path import EmbeddedPath
+from dikbench.simulation.closed_loop import simulate
+from dikbench.simulation.oracle_formulation import OracleFormulation
+from dikbench.solvers.checked_solve import make_solve
+
+FAMILIES = (
+    "speed-sweep[laps=1]",
+    "near-miss[miss=0.02]",
+    "back-and-forth",
+    "pick-and-place",
+    "task-conflict",
+    "joint-limit-approach",
+    "humanoid[laps=1]",
+)
+
+
+class Idle:
+    """Stands still."""
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """Return v = 0."""
+        return np.zeros(problem.robot.nv)
+
+
+@cache
+def scenario_of(name: str) -> Scenario:
+    """Built once."""
+    return make_scenario(name)
+
+
+def motion(scenario: Scenario, law: Formulation) -> Motion:
+    """The motion of a time-indexed run without a solver."""
+    run = simulate(scenario, law, make_solve(None, None), make_plant("ideal"))
+    return motion_of(run.trace, scenario, run.jacobians)
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_the_exact_motion_is_on_its_path_all_of_it_and_in_time(name: str) -> None:
+    """Within 0.01 mm, not a sample late, all done, on course; at a tolerance of 0.05 mm as well."""
+    scenario = scenario_of(name)
+    got = evaluate(motion(scenario, OracleFormulation.of(scenario)))
+    assert got["contour_error_6d_max_m"] <= 1e-5
+    assert got["tracking_error_6d_max_m"] <= 1e-4
+    assert got["lag_max_s"] == got["lag_final_s"] == 0.0
+    assert got["path_done_share"] == 1.0
+    # Between two steps the motion is taken to be straight, the path bends.
+    assert got["path_done_99_tolerance_m"] <= 5e-5
+    assert got["lag_tolerance_m"] <= 5e-5
+    assert got["course_rad"] <= math.radians(1)
+    assert math.isnan(got["slow_down"])
+
+
+@pytest.mark.parametrize("name", ["speed-sweep[laps=1]", "back-and-forth", "hexagon"])
+def test_standing_still_covers_next_to_nothing_of_a_closed_path(name: str) -> None:
+    """Though the path ends where the robot stands; and it is late by nearly all of it."""
+    scenario = scenario_of(name)
+    got = evaluate(motion(scenario, Idle()))
+    assert got["path_done_share"] < 0.05
+    assert got["lag_final_s"] > 0.8 * scenario.reference.duration
+    assert got["path_done_99_tolerance_m"] > 5 * scenario.tolerance_m
+    assert got["path_done_90_tolerance_m"] <= got["path_done_99_tolerance_m"]
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_the_nearest_point_of_a_path_is_the_least_over_its_pieces(seed: int) -> None:
+    """With rests, ways back and laps among the pieces, against every piece in turn."""
+    random = np.random.default_rng(seed)
+    count, d = int(random.integers(2, 150)), int(random.integers(1, 13))
+    points = np.cumsum(
+        random.choice([0.0, 1e-4, 1e-2], (count, 1)) * random.normal(size=(count, d)), 0
+    )
+    arcs = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    path = EmbeddedPath(np.arange(float(count)), points, arcs, count - 1)
+    asked = points[random.integers(0, count, 20)] + random.choice([0, 1e-3, 0.1]) * random.normal(
+        size=(20, d)
+    )
+    every = np.broadcast_to(np.arange(count - 1), (20, count - 1))
+    _, squares = path.feet(asked[:, None], every)
+    distances, pieces, shares = path.nearest(asked)
+    np.testing.assert_allclose(distances, np.sqrt(squares.min(axis=1)), atol=1e-12)
+    feet = points[pieces] + shares[:, None] * path.pieces[pieces]
+    np.testing.assert_allclose(np.linalg.norm(asked - feet, axis=1), distances, atol=1e-12)
+
+
+def test_of_a_path_that_runs_over_itself_the_first_pieces_count() -> None:
+    """There and back on the same samples: whichever copy a search comes upon, it is the first."""
+    there = np.column_stack([np.linspace(0, 1, 60) ** 3, np.zeros(60)])
+    points = np.concatenate([there, there[-2::-1]])
+    arcs = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    path = EmbeddedPath(np.arange(119.0), points, arcs, 118)
+    asked = np.column_stack([np.linspace(0, 1, 500), np.full(500, 0.01)])
+    distances, pieces, _ = path.nearest(asked)
+    assert (pieces < 59).all()
+    np.testing.assert_allclose(distances, 0.01, atol=1e-12)
+
+
+def test_a_foot_that_slips_counts_like_the_hand() -> None:
+    """All of the humanoid is carried 3 cm sideways: hand and feet are off, by the same."""
+    scenario = scenario_of("humanoid[laps=1]")
+    assert len(scenario.held_frames) == 2
+    exact = motion(scenario, OracleFormulation.of(scenario))
+    q = exact.trace.q.copy()
+    q[40:, 0] += 0.03
+    moved = motion_of(replace(exact.trace, q=q), scenario)
+    hand = np.linalg.norm(moved.points - moved.target_points, axis=1)
+    assert moved.tracking_error[50] == pytest.approx(0.03, abs=1e-6)
+    assert hand[50] == pytest.approx(0.03, abs=1e-6)
+    on_path = replace(moved, points=exact.points)  # the hand alone is back
+    assert on_path.tracking_error[50] == pytest.approx(0.03, abs=1e-6)
+    assert on_path.contour_error_6d[50] == pytest.approx(0.03, abs=1e-6)
+    assert METRICS["path_done_99_tolerance_m"].of(on_path) == pytest.approx(0.03, abs=1e-6)
+
+
+@pytest.mark.parametrize(("factor", "expected"), [(1.01, 1.0), (0.99, 0.0)])
+@pytest.mark.parametrize("dt", [0.002, 0.01])
+def test_chatter_is_back_and_forth_beyond_the_acceleration_limit(
+    factor: float, expected: float, dt: float
+) -> None:
+    """Of a joint whose velocity alternates, whatever the control period; but for the first step."""
+    scenario = replace(scenario_of("speed-sweep[laps=1]"), dt=dt, v0=np.zeros(7), duration=1.0)
+    n = 100
+    jump = factor * largest_acceleration(scenario.robot)[2] * dt
+    v = np.zeros((n, 7))
+    v[::2, 2] = jump
+    q = [scenario.q0]
+    for each in v:
+        q.append(pin.integrate(scenario.robot.model, q[-1], each * dt))
+    still = motion(scenario, Idle()).trace
+    nothing, none = np.zeros(n), np.zeros(n, dtype=int)
+    trace = replace(
+        still, q=np.array(q), tau=dt * np.arange(n + 1.0), wanted=np.zeros((n, 6)), commanded=v,
+        applied=v, status=none, relaxed=none, claimed=none, verified=none, primal=nothing,
+        dual=nothing, gap=nothing, distance=nothing,
+    )  # fmt: skip
+    chattering = METRICS["chatter_steps"].of(motion_of(trace, scenario))
+    assert chattering == expected * (n - 1)
