@@ -53,5 +53,5 @@ def parse_tolerance(text: str) -> Tolerance:
             "position_error_rms_m=1e-6 or position_error_rms_m=5%"
         )
     if name not in METRICS:
-        raise unknown("metric", name, METRICS, f"in tolerance {text!r}")
+        raise unknown("metric", name, METRICS, f"in tolerance {text!r}", "dikbench list metrics")
     return Tolerance(name, bound, percent)

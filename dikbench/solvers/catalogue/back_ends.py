@@ -145,6 +145,16 @@ class Solver:
     then: Solver | None = None
 
 
+_VALID: Final[Mapping[type, str]] = MappingProxyType(
+    {
+        bool: "true or false",
+        float: "a number, finite and at least 0",
+        int: "a whole number, finite and at least 1",
+    }
+)
+"""What a setting may be, by its type."""
+
+
 def is_installed(name: str) -> bool:
     """Say whether the back end of this name can be imported here."""
     return importlib.util.find_spec(BACK_ENDS[name].package) is not None
@@ -221,7 +231,7 @@ def _settings(
             value: float = msgspec.convert(text, kind, strict=False)
         except msgspec.ValidationError:
             raise DikbenchError(
-                f"solver {selector.name}: {key} must be of type {kind.__name__}, got {text!r}"
+                f"solver {selector.name}: {key} must be {_VALID[kind]}, got {text!r}"
             ) from None
         least = 1 if kind is int else 0  # a tolerance may be switched off by 0
         if kind is not bool and not least <= value < float("inf"):
