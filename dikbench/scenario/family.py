@@ -13,6 +13,7 @@ from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.parameters import Parameters, Range, parameters_of
 from dikbench.problem.constraints import Constraint
+from dikbench.problem.embedding import embedding_of
 from dikbench.problem.tasks import PoseTask, Task, TrackingTask, TrackingTogether
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.robot import Robot
@@ -30,7 +31,14 @@ from dikbench.scenario.scenario import Judged, Scenario, first_level
 from dikbench.scenario.situation import Situation, situation_of
 from dikbench.scenario.tolerance import sampling_floor, tolerance_above
 from dikbench.scenario.variation import NO_VARIATION, Perturbation, Variation
-from dikbench.scenario.witness import Feasible, Witness, beyond, followable, witness_of
+from dikbench.scenario.witness import (
+    Feasible,
+    Witness,
+    beyond,
+    does_the_task,
+    followable,
+    witness_of,
+)
 
 RETURN_TIME_CONSTANTS: Final = 5.0
 """Time constants 1/gain of the tracking task for which a time-indexed run goes on with the target
@@ -167,7 +175,7 @@ class Family(Parameters, ABC):
             tasks = secondary_tasks(robot, case.q0, tracking)
         if v0 is None:
             v0 = start_velocity(robot, case.reference, case.q0, first_level(tracking, tasks))
-        witness = _first_witness(case, robot, v0)
+        witness = _first_witness(case, robot, tracking, v0)
         feasible, duration = _feasible(case.reference, witness), case.reference.duration
         until, comes_back = case.followable_until, case.comes_back
         if witness is None and case.motion is not None:
@@ -228,12 +236,13 @@ class Family(Parameters, ABC):
         return oracle_motion(robot, reference, q0, instants, tracking)
 
 
-def _first_witness(case: Case, robot: Robot, v0: Array) -> Witness | None:
+def _first_witness(case: Case, robot: Robot, tracking: TrackingTask, v0: Array) -> Witness | None:
     """Return the first of a case's joint motions that is a witness; None where none is."""
+    reference = case.reference
+    embedding = embedding_of(tracking, robot, reference.placement(0.0).rotation)
     for motion in (case.motion, case.witness):
-        if motion is not None:
-            duration = case.reference.duration
-            witness = witness_of(robot, motion, case.constraints, v0, duration)
+        if motion is not None and does_the_task(robot, motion, reference, embedding):
+            witness = witness_of(robot, motion, case.constraints, v0, reference.duration)
             if witness is not None:
                 return witness
     return None
