@@ -19,7 +19,9 @@ from dikbench.cli.one_line_errors import one_line_errors
     multiple=True,
     metavar="METRIC=VALUE",
     help="How much worse a metric may become in any trial, in its unit or in percent of its value "
-    "in A ('position_error_rms_m=5%'); repeat. A trial that newly fails exceeds it as well.",
+    "in A ('position_error_rms_m=5%'); how much the rate of success of a formulation may fall "
+    "('success=2%', else 0); how much longer it may take ('formulation_time_median_us=20%'); "
+    "repeat. Trials that are missing or newly fail exceed it as well, and those whose solver does.",
 )
 @click.option(
     "--out",
