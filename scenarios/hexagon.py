@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import pi
 from types import MappingProxyType
 from typing import Annotated, Literal
@@ -11,20 +12,30 @@ from typing import Annotated, Literal
 import numpy as np
 import pinocchio as pin
 
-from dikbench.problem import Array, Drawn, PositionTask, Range, Robot
+from dikbench.problem import Array, Drawn, Kinematics, PositionTask, Range, Robot, null_space
 from dikbench.scenario import (
     Case,
     Claim,
     Family,
+    OracleMotion,
     Perturbation,
     Reference,
     Variation,
+    measure_motion,
     placement_of,
     plane_of,
+    solve_placement,
     through,
 )
 
 RADIUS_M = 0.2
+
+SAMPLES_PER_LAP = 120
+"""Samples of the motion that keeps the limits, per lap."""
+
+PULL_PER_M = 2.0
+"""Share of the way to the posture at rest by which the null space moves the joints, per metre along
+the path."""
 
 
 @dataclass(frozen=True)
@@ -36,17 +47,20 @@ class SetUp:
         centre: centre of the hexagon [m].
         required: lower bound on the peak joint speed of the least-norm motion over the limits, per
             m/s along the path.
+        rest: where the null space moves the joints in a motion that keeps the limits [rad]; None
+            where there is no such motion.
     """
 
     start: tuple[float, ...]
     centre: tuple[float, float, float]
     required: float
+    rest: tuple[float, ...] | None = None
 
 
 SET_UPS: Mapping[str, SetUp] = MappingProxyType(
     {
         "lwr": SetUp((0.0, pi / 4, pi / 4, pi / 4, 0.0, 0.0, 0.0), (0.1, 0.35, 0.6235), 3.0),
-        "planar4r": SetUp((0.0, pi / 2, -pi / 2, pi / 2), (0.7, 0.0, 0.0), 1.4),
+        "planar4r": SetUp((0.0, pi / 2, -pi / 2, pi / 2), (0.7, 0.0, 0.0), 1.4, (0.0,) * 4),
     }
 )
 
@@ -59,11 +73,14 @@ class Hexagon(Family):
     corner to corner, all at the same speed: in the y-z plane about (0.1, 0.35, 0.6235) m, from
     (0, 45, 45, 45, 0, 0, 0) deg, for the LWR; in the x-y plane about (0.7, 0) m, from
     (0, 90, -90, 90) deg, for the planar arm. The least-norm motion leaves the joints' ranges and,
-    at higher speeds, exceeds their velocity limits: only the null space can keep the limits. In the
-    original each corner is the target until it is near; here the same lines are indexed by time, so
-    that every formulation has the same targets. A seed moves the start by up to 0.05 rad per joint.
+    at higher speeds, exceeds their velocity limits. On the planar arm the null space can keep the
+    limits: a motion that does so is the least-norm one with a pull of the joints towards 0. On the
+    LWR nothing can: a corner is 0.30 m from the shoulder, and with the elbow at its limit of 120
+    deg the tool is at least 0.317 m away. In the original each corner is the target until it is
+    near; here the same lines are indexed by time, so that every formulation has the same targets. A
+    seed moves the start by up to 0.05 rad per joint.
 
-    Provokes: position and velocity limits that only the null space can keep
+    Provokes: position and velocity limits that the least-norm motion breaks
 
     Shows in: position_violation_max_rad, velocity_violation_max_rad_s, progress_mean
 
@@ -97,7 +114,24 @@ class Hexagon(Family):
             Claim("margin of the least-norm motion [rad]", motion.margin.min(), at_most=-0.05),
             Claim("required speed over limit", fastest, at_least=required),
         )
-        return Case(reference, q0, motion, claims, tracking=tracking)
+        witness = None if where.rest is None else self._kept(robot, reference, q0, where.rest)
+        return Case(reference, q0, motion, claims, tracking=tracking, witness=witness)
+
+    def _kept(
+        self, robot: Robot, reference: Reference, q0: Array, rest: tuple[float, ...]
+    ) -> OracleMotion:
+        """Follow the path while the null space moves the joints towards a posture."""
+        instants = np.linspace(0.0, reference.duration, SAMPLES_PER_LAP * (self.laps + 1) + 1)
+        tracking, kinematics, motion = PositionTask(gain=self.gain), Kinematics(robot), [q0]
+        rows = list(tracking.rows(robot))
+        for before, tau in pairwise(instants):
+            kinematics.update(motion[-1])
+            Z = null_space(kinematics.jacobian(robot.frame_id)[rows], 1e-6)
+            share = PULL_PER_M * self.speed * (tau - before)
+            pull = share * pin.difference(robot.model, motion[-1], np.array(rest))
+            seed = pin.integrate(robot.model, motion[-1], Z @ (Z.T @ pull))
+            motion.append(solve_placement(robot, reference.placement(tau), seed, tracking=tracking))
+        return measure_motion(robot, instants, np.array(motion), tracking)
 
 
 def _path(arm: Robot, q0: Array, centre: Array, speed: float, laps: int) -> Reference:

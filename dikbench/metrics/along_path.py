@@ -74,23 +74,19 @@ class AlongPath:
     def coverage(self) -> Coverage:
         """How the path is covered in its order, for every tolerance."""
         at_target = np.searchsorted(self.trace.tau, self.path.times - SAME_INSTANT_S)
-        return Coverage(
-            self.path.points,
-            self.points,
-            self.target_samples,
-            np.minimum(at_target, self.trace.steps),
-            self.apart,
-            self.scenario.tolerance_m,
-        )
+        at_target = np.minimum(at_target, self.trace.steps)
+        return Coverage(self.path.points, self.points, self.target_samples, at_target, self.apart)
 
     @cached_property
-    def covered_at(self) -> list[int]:
+    def covered_at(self) -> Indices:
         """The instants at which samples are covered at the scenario's own tolerance."""
         return self.coverage.instants(self.scenario.tolerance_m)
 
     @cached_property
     def done(self) -> float:
         """Share of the path that is covered at the end, at the scenario's own tolerance."""
+        if self._needed[2] <= self.scenario.tolerance_m:
+            return 1.0
         arcs = self.path.arcs
         return float(arcs[max(len(self.covered_at) - 1, 0)] / arcs[self.last_sample])
 
@@ -108,23 +104,28 @@ class AlongPath:
         late: Array = times[self.target_samples[instants]] - times[np.maximum(covered, 0)]
         return late
 
-    @cached_property
+    @property
     def tolerances(self) -> tuple[float, float, float]:
         """The smallest tolerances [m] at which 99 % and 90 % are covered at the end, and in time.
 
         In time is who is late by at most 0.1 s at the end of the reference, or 5 % of its nominal
         duration where that is more; NaN where it waits for the robot. Infinite above 0.25 m.
         """
-        by_clock, end = self.trace.mode == "time", self.end_of_reference
-        wanted = [share * self.path.arcs[self.last_sample] - ROUNDING for share in DONE_SHARES]
-        asked = [
-            (int(sample), self.trace.steps) for sample in np.searchsorted(self.path.arcs, wanted)
-        ]
+        done_99, done_90, _, in_time = self._needed
+        return done_99, done_90, in_time
+
+    @cached_property
+    def _needed(self) -> tuple[float, float, float, float]:
+        """The tolerances at which 99 %, 90 % and all are covered at the end, and in time [m]."""
+        by_clock, end, arcs = self.trace.mode == "time", self.end_of_reference, self.path.arcs
+        wanted = [share * arcs[self.last_sample] - ROUNDING for share in DONE_SHARES]
+        samples = [*np.searchsorted(arcs, wanted).tolist(), self.last_sample]
+        asked = [(sample, self.trace.steps) for sample in samples]
         allowed = max(LAG_ALLOWED_S, LAG_ALLOWED_SHARE * self.scenario.reference.duration)
         latest = self.path.times[self.target_samples[end]] - allowed - ROUNDING
         sample = int(np.searchsorted(self.path.times, latest))
         # Before anything is covered a motion counts as being at the start.
         is_open = by_clock and sample > 0
         found = self.coverage.needed([*asked, (sample, end)] if is_open else asked)
-        in_time = found[2] if is_open else 0.0 if by_clock else float("nan")
-        return found[0], found[1], in_time
+        in_time = found[3] if is_open else 0.0 if by_clock else float("nan")
+        return found[0], found[1], found[2], in_time

@@ -9,85 +9,77 @@ that a closed path is not covered by standing still.
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Sequence
-from functools import cached_property
-from typing import Final
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, Final
 
 import numpy as np
-from scipy.spatial.distance import cdist
 
 from dikbench.arrays import Array, Indices
-
-INF: Final = float("inf")
-
-SAMPLES_PER_BLOCK: Final = 32
-"""Distances are computed for this many samples at a time."""
 
 LARGEST_TOLERANCE_M: Final = 0.25
 """No larger tolerance is searched for: a motion that needs one has not done the path."""
 
-ROUNDING_M: Final = 1e-7
-"""The distances that decide which others are computed are exact to this."""
+SQUARE_ROUNDING_M2: Final = 1e-14
+"""Rounding of square distances: a needed tolerance is exact to 5e-12 m at 1 mm, to 1e-7 m at 0."""
 
-INSTANTS_PER_BLOCK: Final = 8
-"""Of so many instants it is asked together whether they come near a block of samples."""
+SAMPLES_TOGETHER: Final = 64
+SEGMENTS_TOGETHER: Final = 48
+"""The distances of so many samples from so many segments are computed at once ..."""
 
-CLOSE_M: Final = 0.02
-"""If each sample is so near when the target is there, no other bound of the tolerance is sought."""
+MOST_SEGMENTS_TOGETHER: Final = 3072
+"""... and from up to so many where the motion rests, or is elsewhere."""
+
+DISTANCES_TOGETHER: Final = 32768
+"""About so many distances of samples from all segments are computed at once."""
+
+SAMPLES_PER_LOOK: Final = 24
+"""So many samples are looked at together for a lower bound of the needed tolerance."""
 
 
 class Coverage:
-    """The ordered coverage of a path by a motion, for every tolerance up to `LARGEST_TOLERANCE_M`.
+    """The ordered coverage of a path by a motion, for every tolerance.
 
     Args:
         samples: S_j, (f, d) [m] (see `Embedding`).
         points: of the motion, at the start and after each step, (n + 1, d) [m].
         targets: number of the sample that the target has come to at each instant, not decreasing,
             (n + 1,): no later one is covered yet.
-        at_target: number of the instant at which the target is there, or of the last one, (f,).
+        at_target: number of the instant at which the target is there, or of the last one, (f,);
+            where a sample is expected to be covered.
         apart: how far the other frames of the task are from their own targets in each segment,
             (n + 1,) [m]; the largest of the distances counts.
-        radius: tolerance up to which distances are computed to begin with [m].
     """
 
     def __init__(
-        self,
-        samples: Array,
-        points: Array,
-        targets: Indices,
-        at_target: Indices,
-        apart: Array,
-        radius: float,
+        self, samples: Array, points: Array, targets: Indices, at_target: Indices, apart: Array
     ) -> None:
-        count = int(targets[-1]) + 1
-        starts = np.concatenate([points[:1], points[:-1]])
-        self._samples, self._starts, self._ways = samples[:count], starts, points - starts
-        self._way_squares = np.einsum("ij,ij->i", self._ways, self._ways)
-        self._apart, self._radius = apart, radius
+        count, ones = int(targets[-1]) + 1, np.ones(len(points))
+        S, x = samples[:count] - samples[0], points - samples[0]
+        starts = np.concatenate([x[:1], x[:-1]])
+        ways = x - starts
+        self._lengths = np.sqrt(np.einsum("ij,ij->i", ways, ways))
+        ways /= np.where(self._lengths > 0, self._lengths, 1.0)[:, None]
+        along, squares = (np.einsum("ij,ij->i", starts, each) for each in (ways, starts))
+        # |S - a|^2 and (S - a) . d are products of [S, 1, |S|^2] with these.
+        self._samples = np.column_stack([S, ones[:1].repeat(count), np.einsum("ij,ij->i", S, S)])
+        self._away = np.column_stack([-2 * starts, squares, ones])
+        self._along = np.column_stack([ways, -along, 0 * ones])
+        self._apart_squares = apart**2 if apart.any() else None
         self._earliest = np.searchsorted(targets, np.arange(count))
-        self._at_target = np.maximum(at_target[:count], self._earliest)
-        self._last_of_blocks = np.append(
-            np.arange(SAMPLES_PER_BLOCK - 1, count - 1, SAMPLES_PER_BLOCK), count - 1
+        expected = np.maximum(at_target[:count], self._earliest)
+        self._by_clock = np.array_equal(expected, self._earliest)
+        self._at_target = self._squares(slice(None), expected, pairs=True)
+        after = np.minimum(expected + 1, len(points) - 1)
+        self._about_target = np.minimum(
+            self._at_target, self._squares(slice(None), after, pairs=True)
         )
+        self._rows: dict[int, Array] = {}
 
-    def instants(self, tolerance: float) -> list[int]:
+    def instants(self, tolerance: float) -> Indices:
         """Find the instants at which samples are covered at a tolerance [m], as far as they are."""
-        self._search_within(tolerance)
-        covered: list[int] = []
-        now = 0
-        for near, distances in self._blocks:
-            hits, width = (distances <= tolerance).tobytes(), len(near)
-            place = bisect_left(near, now)
-            for row in range(0, len(hits), max(width, 1)):
-                found = hits.find(1, row + place, row + width)
-                if found < 0:
-                    return covered
-                place = found - row
-                covered.append(near[place])
-            if not width:
-                break
-            now = covered[-1]
-        return covered
+        found = np.empty(len(self._samples), dtype=int)
+        last = len(found) - 1, len(self._lengths) - 1
+        return found[: self._cover(found, 0, tolerance**2, *last)]
 
     def needed(self, wanted: Sequence[tuple[int, int]]) -> list[float]:
         """Find the smallest tolerances at which samples are covered by instants [m].
@@ -95,137 +87,145 @@ class Coverage:
         Infinite where the target did not come to the sample by then, or the tolerance would be
         above `LARGEST_TOLERANCE_M`.
 
+        What a few of the samples need, in their order, is a lower bound. It is the answer if all
+        are covered at it; otherwise more are looked at, where one is not covered, or late.
+
         Args:
             wanted: the number of a sample and of an instant, for each.
         """
-        found = [INF] * len(wanted)
-        possible = {
-            number: (sample, until)
+        found = [float("inf")] * len(wanted)
+        order = sorted(
+            (sample, until, number)
             for number, (sample, until) in enumerate(wanted)
             if sample < len(self._samples) and self._earliest[sample] <= until
-        }
-        enough = [min(self._enough(*each), LARGEST_TOLERANCE_M) for each in possible.values()]
-        self._search_within(max(enough, default=0.0))
-        last = max((sample for sample, _ in possible.values()), default=-1)
-        asked = {sample for sample, _ in possible.values()}
-        known, needed, sample = [0], np.zeros(1), -1
-        for near, distances in self._blocks:
-            if sample == last or not near:
-                break
-            # By an instant between two that come near, what the one before allows is needed.
-            before = np.searchsorted(known, near, side="right") - 1
-            needed = np.where(before < 0, INF, needed[before])
-            known = near
-            for row in distances:
-                np.maximum(needed, row, out=needed)
-                np.minimum.accumulate(needed, out=needed)
-                sample += 1
-                if sample in asked:
-                    for number, (other, until) in possible.items():
-                        place = bisect_left(known, until + 1) - 1
-                        if other == sample and place >= 0:
-                            found[number] = float(needed[place])
-        return [value if value <= LARGEST_TOLERANCE_M else INF for value in found]
+        )
+        self._look_at(self._farthest(max((sample for sample, _, _ in order), default=0)))
+        self._look_at([sample for sample, _, _ in order])
+        bounds = self._bounds(order)
+        instants, covered, square, begun = np.empty(len(self._samples), dtype=int), 0, 0.0, 0.0
+        for place, (sample, until, number) in enumerate(order):
+            while bounds[place] <= LARGEST_TOLERANCE_M**2:
+                if bounds[place] < square or (covered and instants[covered - 1] > until):
+                    covered = 0
+                square = bounds[place]
+                begun = begun if covered else square
+                enough = square + SQUARE_ROUNDING_M2
+                covered = self._cover(instants, covered, enough, sample, until)
+                if covered > sample:
+                    found[number] = float(np.sqrt(square))
+                    break
+                self._look_around(covered)
+                bounds = self._bounds(order)
+                if bounds[place] > square:
+                    continue
+                if begun == square:  # else the first were covered at less, and later
+                    for late in self._late(instants[:covered]):
+                        self._look_around(late)
+                        bounds = self._bounds(order)
+                        if bounds[place] > square:
+                            break
+                    else:  # all were looked at: what keeps one from being covered is rounding
+                        found[number] = float(np.sqrt(square))
+                        break
+                covered = 0
+        return found
 
-    def _enough(self, sample: int, until: int) -> float:
-        """Compute a tolerance that is enough for a sample to be covered by an instant [m].
+    def _farthest(self, last: int) -> list[int]:
+        """Choose samples that are far from the motion when the target is there, all along it."""
+        length = last // SAMPLES_PER_LOOK + 1
+        far, starts = self._about_target, range(0, last, length)
+        return [first + int(far[first : first + length].argmax()) for first in starts]
+
+    def _late(self, instants: Indices) -> Iterator[int]:
+        """Give the samples that were not looked at, those first that were waited for longest."""
+        before = np.maximum(np.append(0, instants[:-1]), self._earliest[: len(instants)])
+        for sample in np.argsort(before - instants, kind="stable").tolist():
+            if sample not in self._rows:
+                yield sample
+
+    def _look_around(self, sample: int) -> None:
+        """Look at a sample and at others between the two next to it that were."""
+        known = sorted(self._rows)
+        place = bisect_left(known, sample)
+        first, last = known[max(place - 1, 0)], known[place]
+        self._look_at([*range(first, last, (last - first) // SAMPLES_PER_LOOK + 1), sample])
+
+    def _look_at(self, samples: Iterable[int]) -> None:
+        """Compute the distances of samples from all segments."""
+        new = sorted(set(samples) - self._rows.keys())
+        together = DISTANCES_TOGETHER // len(self._lengths) + 1
+        for first in range(0, len(new), together):
+            part = new[first : first + together]
+            self._rows.update(zip(part, self._squares(part, slice(None)), strict=True))
+
+    def _bounds(self, order: Sequence[tuple[int, int, int]]) -> list[float]:
+        """Compute at which square tolerances [m^2] the samples looked at are covered in time.
 
         With g_j(k) the smallest one at which sample j is covered by instant k,
 
-            g_j(k) = min over k' <= k of max(g_(j-1)(k'), distance of S_j from segment k')
-
-        over the last samples of blocks and this one, plus how far the others are from these. Where
-        the motion is near when the target is there, that is enough.
+            g_j(k) = min over k' <= k of max(g_(j-1)(k'), square distance of S_j from segment k')
         """
-        together = self._needed_at_target
-        if self._at_target[sample] <= until and together[sample] <= CLOSE_M:
-            return float(together[sample])
-        before = int(np.searchsorted(self._last_of_blocks, sample))
-        rows = [self._needed_at_blocks[before - 1]] if before else []
-        row = self._distances(np.array([sample]), np.arange(len(self._starts)))[0]
-        row[: self._earliest[sample]] = np.inf
-        largest = np.max([*rows, row], axis=0)
-        return float(largest[: until + 1].min()) + 2 * float(self._reaches.max())
+        bounds, needed = dict.fromkeys(order, 0.0), np.zeros(len(self._lengths))
+        for sample in sorted(self._rows):
+            possible = slice(self._earliest[sample], None)
+            part = needed[possible]
+            np.maximum(part, self._rows[sample][possible], out=part)
+            np.minimum.accumulate(part, out=part)
+            bounds.update((each, float(needed[each[1]])) for each in order if each[0] == sample)
+        return list(bounds.values())
 
-    @cached_property
-    def _needed_at_target(self) -> Array:
-        """The tolerance at which each sample is covered when the target is there, (count,) [m]."""
-        k = self._at_target
-        away, d, squares = self._samples - self._starts[k], self._ways[k], self._way_squares[k]
-        share = np.einsum("ij,ij->i", away, d) / np.where(squares > 0, squares, 1.0)
-        away -= np.clip(share, 0.0, 1.0)[:, None] * d
-        distances = np.sqrt(np.einsum("ij,ij->i", away, away))
-        needed: Array = np.maximum.accumulate(np.maximum(distances, self._apart[k]))
-        return needed + ROUNDING_M
+    def _cover(
+        self, instants: Indices, covered: int, square: float, sample: int, until: int
+    ) -> int:
+        """Cover samples in turn until one is, or none can be by an instant, at a square tolerance.
 
-    @cached_property
-    def _needed_at_blocks(self) -> Array:
-        """The smallest tolerances g_j(k) of the last samples of blocks alone, (blocks, n + 1)."""
-        needed = np.empty_like(self._from_blocks)
-        before = np.zeros(needed.shape[1])
-        for sample, row, out in zip(self._last_of_blocks, self._from_blocks, needed, strict=True):
-            np.maximum(before, row, out=out)
-            out[: self._earliest[sample]] = np.inf
-            before = np.minimum.accumulate(out, out=out)
-        return needed
+        Args:
+            instants: those at which samples are covered; the next are written into it.
+            covered: how many are.
+            square: the tolerance [m^2].
+            sample: the last sample.
+            until: the last instant.
 
-    @cached_property
-    def _from_blocks(self) -> Array:
-        """The distances of the last samples of blocks from every segment, (blocks, n + 1) [m]."""
-        return self._distances(self._last_of_blocks, np.arange(len(self._starts)))
-
-    @cached_property
-    def _reaches(self) -> Array:
-        """The largest distance of a sample of a block from the last one, (blocks,) [m]."""
-        last = self._last_of_blocks.repeat(SAMPLES_PER_BLOCK)[: len(self._samples)]
-        away = self._samples - self._samples[last]
-        squares = np.einsum("ij,ij->i", away, away)
-        starts = np.arange(0, len(squares), SAMPLES_PER_BLOCK)
-        reaches: Array = np.sqrt(np.maximum.reduceat(squares, starts)) + ROUNDING_M
-        return reaches
-
-    def _search_within(self, radius: float) -> None:
-        """Compute the distances up to a radius [m], where that is not done."""
-        if radius > self._radius:
-            self._radius = radius
-            self.__dict__.pop("_blocks", None)
-
-    @cached_property
-    def _blocks(self) -> list[tuple[list[int], Array]]:
-        """Of each block the segments that come near it, and its samples' distances from them [m].
-
-        A distance is infinite where the target had not come to the sample yet.
+        Returns:
+            How many are covered then.
         """
-        blocks = []
-        count = len(self._starts)
-        middles = np.arange(0, count, INSTANTS_PER_BLOCK)
-        own = np.repeat(middles, INSTANTS_PER_BLOCK)[:count]
-        begins, ends = self._starts - self._starts[own], self._ways
-        ends = begins + ends
-        squares = np.maximum(
-            np.einsum("ij,ij->i", begins, begins), np.einsum("ij,ij->i", ends, ends)
+        if self._by_clock and not covered:
+            far = (self._at_target > square) | (self._earliest > until)
+            covered = min(int(far.argmax()) if far.any() else len(far), sample + 1)
+            instants[:covered] = self._earliest[:covered]
+        now, together = int(instants[covered - 1]) if covered else 0, SEGMENTS_TOGETHER
+        while covered <= sample:
+            now = max(now, int(self._earliest[covered]))
+            if now > until:
+                break
+            height = max(SAMPLES_TOGETHER * SEGMENTS_TOGETHER // together, 1)
+            rows = slice(covered, min(covered + height, sample + 1))
+            segments = slice(now, min(now + together, until + 1))
+            near = self._squares(rows, segments) <= square
+            near &= np.arange(now, segments.stop) >= self._earliest[rows, None]
+            # The first that is near and not before that of the sample before, if that is near.
+            first = np.maximum.accumulate(near.argmax(axis=1))
+            far = ~near[np.arange(len(near)), first]
+            count = int(far.argmax()) if far.any() else len(far)
+            instants[covered : covered + count] = first[:count] + now
+            covered += count
+            now = int(instants[covered - 1]) if count else segments.stop
+            together = SEGMENTS_TOGETHER if count else min(2 * together, MOST_SEGMENTS_TOGETHER)
+        return covered
+
+    def _squares(self, samples: Any, segments: Any, pairs: bool = False) -> Array:
+        """Compute square distances [m^2] of samples from segments, (samples, segments) or pairs."""
+        S, lengths = self._samples[samples], self._lengths[segments]
+        squares: Array
+        squares, along = (
+            np.einsum("ij,ij->i", S, each[segments]) if pairs else S @ each[segments].T
+            for each in (self._away, self._along)
         )
-        reaches = np.sqrt(np.maximum.reduceat(squares, middles))
-        away = cdist(self._samples[self._last_of_blocks], self._starts[middles])
-        near = away <= self._radius + self._reaches[:, None] + reaches + ROUNDING_M
-        for number, row in enumerate(near):
-            segments = np.flatnonzero(row.repeat(INSTANTS_PER_BLOCK)[:count])
-            first = SAMPLES_PER_BLOCK * number
-            samples = np.arange(first, min(first + SAMPLES_PER_BLOCK, len(self._samples)))
-            distances = self._distances(samples, segments)
-            distances[segments < self._earliest[samples, None]] = np.inf
-            blocks.append((segments.tolist(), distances))
-        return blocks
-
-    def _distances(self, samples: Indices, segments: Indices) -> Array:
-        """Compute the distances of samples from segments, (samples, segments) [m]."""
-        centre = self._samples[samples[-1]]  # near which rounding is least
-        S, a = self._samples[samples] - centre, self._starts[segments] - centre
-        d, squares = self._ways[segments], self._way_squares[segments]
-        along = S @ d.T - np.einsum("ij,ij->i", a, d)
-        share = np.clip(along / np.where(squares > 0, squares, 1.0), 0.0, 1.0)
-        away = -2 * (S @ a.T)
-        away += np.einsum("ij,ij->i", S, S)[:, None] + np.einsum("ij,ij->i", a, a)
-        away += share * (share * squares - 2 * along)
-        distances: Array = np.sqrt(np.maximum(away, 0.0))
-        return np.maximum(distances, self._apart[segments], out=distances)
+        share = np.minimum(np.maximum(along, 0.0), lengths)
+        along *= 2
+        along -= share
+        along *= share
+        squares -= along
+        if self._apart_squares is not None:
+            np.maximum(squares, self._apart_squares[segments], out=squares)
+        return squares

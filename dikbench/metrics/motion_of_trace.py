@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dikbench.arrays import Array
+from dikbench.errors import DikbenchError
 from dikbench.metrics.motion import Motion
 from dikbench.robots.kinematics import Kinematics, placements
 from dikbench.scenario.scenario import Scenario
@@ -19,7 +20,11 @@ def motion_of(trace: Trace, scenario: Scenario, jacobians: Array | None = None) 
         scenario: the case of the trace.
         jacobians: the task Jacobians at all configurations but the last, (n, m, nv), if the run has
             computed them; otherwise they are computed, with the same result.
+
+    Raises:
+        DikbenchError: if the trace is not one of the scenario's robot.
     """
+    _check_sizes(trace, scenario)
     robot, frame = scenario.robot, scenario.robot.frame_id
     n, rows = trace.steps, np.array(scenario.rows)
     X = placements(robot, frame, trace.q)
@@ -49,6 +54,19 @@ def motion_of(trace: Trace, scenario: Scenario, jacobians: Array | None = None) 
         points=scenario.embedding.points(X[:, :3, :3], X[:, :3, 3]),
         target_points=scenario.embedding.points(target_rotations, target_translations),
     )
+
+
+def _check_sizes(trace: Trace, scenario: Scenario) -> None:
+    """Check that a trace has as many coordinates as the scenario's robot."""
+    robot = scenario.robot
+    sizes = {"q": robot.nq, "applied": robot.nv}
+    for name, size in sizes.items():
+        shape = getattr(trace, name).shape
+        if shape[1:] != (size,):
+            raise DikbenchError(
+                f"trace of another robot: {name} has shape {shape}; "
+                f"valid for {robot.name}: (steps, {size})"
+            )
 
 
 def _targets(trace: Trace, scenario: Scenario) -> tuple[Array, Array]:

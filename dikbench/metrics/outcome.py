@@ -98,18 +98,18 @@ class Judgement:
     def _not_done(self, tolerance: float) -> Iterator[Verdict]:
         """What keeps the task from being done."""
         if not self.has_path:
-            if self.end.figure > tolerance:
+            if not self.end.figure <= tolerance:  # NaN is no success
                 yield Verdict(Outcome.UNFINISHED, self.end.step, self.end.figure, self.end.reason)
             return
-        if self.off_path.figure > tolerance:
+        if not self.off_path.figure <= tolerance:
             yield self.off_path
         share, needed = DONE_SHARE, self.done_99
         if self.by_clock:
             share, needed = DONE_BY_CLOCK_SHARE, self.done_90
-        if needed > tolerance:
+        if not needed <= tolerance:
             reason = f"tolerance [m] at which {share:.0%} of the path are done"
             yield Verdict(Outcome.UNFINISHED, self.end.step, needed, reason)
-        if self.by_clock and self.in_time > tolerance:
+        if self.by_clock and not self.in_time <= tolerance:
             reason = "tolerance [m] at which it is in time"
             yield Verdict(Outcome.LATE, self.end.step, self.in_time, reason)
 
@@ -122,7 +122,7 @@ class Judgement:
             (self.end.step, self.done_99, bound, cut),
             (self.off_path.step, self.off_path.figure, bound, self.off_path.reason),
         ):
-            if figure > most:
+            if not figure <= most:
                 yield Verdict(Outcome.NOT_RECOVERED, step, figure, reason)
 
     def columns(self, tolerance: float) -> dict[str, Any]:

@@ -28,8 +28,10 @@ ROUNDING_M: Final = 1e-9
 """Added to each bound."""
 
 PARALLEL: Final = 1e-9
-"""Axes with a smaller sine of the angle between them are parallel, and a point nearer to an axis
-[m] is on it."""
+"""Axes with a smaller sine of the angle between them are parallel."""
+
+ON_AXIS_M: Final = 1e-6
+"""A point that is nearer to an axis is on it, up to twice its distance."""
 
 ARC_SAMPLES: Final = 10000
 """Angles of a joint at which a point that moves with it alone is looked at."""
@@ -145,12 +147,12 @@ def _about_next(where: _Where, joint: _Joint, placement: Any, axis: Array) -> _W
         axis: direction of the next one's axis in this one's frame, (3,).
     """
     to = placement.translation
-    on_axis = where.rho[1] < PARALLEL
+    on_axis = where.rho[1] < ON_AXIS_M
     if where.point is not None:
         angles = np.zeros(1) if on_axis else np.linspace(joint.lower, joint.upper, ARC_SAMPLES)
         points = _turned(where.point, joint.axis, -angles) - to
-        width = 0.0 if on_axis else (joint.upper - joint.lower) / (ARC_SAMPLES - 1) / 2
-        spread = where.rho[1] * width
+        half_step = (joint.upper - joint.lower) / (ARC_SAMPLES - 1) / 2
+        spread = where.rho[1] * (2.0 if on_axis else half_step)
         heights, distances = points @ axis, np.linalg.norm(points, axis=1)
         rho = np.sqrt(np.maximum(distances**2 - heights**2, 0.0))
         point = placement.actInv(where.point) if on_axis else None

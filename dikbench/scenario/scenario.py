@@ -16,7 +16,7 @@ from dikbench.problem.tasks import Task, TrackingTask, TrackingTogether
 from dikbench.robots.robot import Robot
 from dikbench.scenario.certificate import Certificate
 from dikbench.scenario.held_frame import HeldFrame, held_frames
-from dikbench.scenario.oracle import OracleMotion, follow
+from dikbench.scenario.oracle import OracleMotion, follow, solve_placement
 from dikbench.scenario.reference.embedded_path import EmbeddedPath, embedded_path
 from dikbench.scenario.reference.path import ReferencePath, reference_path
 from dikbench.scenario.reference.reference import Reference
@@ -177,9 +177,28 @@ class Scenario:
         """The other frames whose tasks are of the priority of the tracking."""
         return held_frames(self.robot, self.tracking, self.tasks)
 
+    def along(self, motion: OracleMotion, tau: float) -> Array:
+        """Compute the configuration of a joint motion at a nominal time [s], (nq,).
+
+        Between two samples it is the posture next to their mean that does the task.
+        """
+        if motion.exact is not None:
+            return motion.exact(tau)
+        k = min(int(np.searchsorted(motion.instants, tau, side="right")) - 1, len(motion.q) - 2)
+        begin, end = motion.instants[k : k + 2]
+        share = (tau - begin) / (end - begin)
+        between: Array = pin.interpolate(self.robot.model, motion.q[k], motion.q[k + 1], share)
+        if not self.reference.moving:
+            return between
+        target = self.reference.placement(tau)
+        return solve_placement(self.robot, target, between, tracking=self.first)
+
     @cached_property
     def oracle(self) -> Array | None:
         """The exact joint motion at every control step, (n + 1, nq); None where there is none.
+
+        Where it is not one that keeps position limits and distances, but another is known, it is
+        the other one.
 
         Raises:
             DikbenchError: if it cannot be followed at this control period.
@@ -189,6 +208,7 @@ class Scenario:
         instants = self.dt * np.arange(self.steps + 1, dtype=float)
         if self.reference.moving:
             instants = np.minimum(instants, self.reference.duration)
-        if self.motion.exact is not None:
-            return np.array([self.motion.exact(tau) for tau in instants])
+        motion = self.motion if self.witness is None else self.witness.motion
+        if motion.exact is not None or motion is not self.motion:
+            return np.array([self.along(motion, tau) for tau in instants])
         return follow(self.robot, self.reference, self.q0, instants, self.first)

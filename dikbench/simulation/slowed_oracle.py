@@ -9,7 +9,6 @@ import pinocchio as pin
 
 from dikbench.arrays import Array
 from dikbench.problem.problem import DikProblem, Solve
-from dikbench.scenario.oracle import solve_placement
 from dikbench.scenario.scenario import Scenario
 
 SPEED_SHARE: Final = 1 - 1e-6
@@ -46,7 +45,7 @@ class SlowedOracle:
         pace = self._torque_pace
         for _ in range(PACE_STEPS):
             tau = min(self._tau + pace * dt, self._end)
-            q = self._configuration(tau)
+            q = self._scenario.along(self._motion, tau)
             v: Array = pin.difference(model, self._q, q) / dt
             usage = 0.0 if limit is None else float(limit.usage(v).max())
             if usage <= SPEED_SHARE * (1 + 1e-9):
@@ -54,17 +53,3 @@ class SlowedOracle:
                 return v
             pace *= SPEED_SHARE / usage
         return np.zeros(problem.robot.nv)
-
-    def _configuration(self, tau: float) -> Array:
-        """Compute the configuration of the witness at a nominal time [s], (nq,)."""
-        motion, scenario = self._motion, self._scenario
-        if motion.exact is not None:
-            return motion.exact(tau)
-        k = min(int(np.searchsorted(motion.instants, tau, side="right")) - 1, len(motion.q) - 2)
-        begin, end = motion.instants[k : k + 2]
-        share = (tau - begin) / (end - begin)
-        between: Array = pin.interpolate(scenario.robot.model, motion.q[k], motion.q[k + 1], share)
-        if not scenario.reference.moving:
-            return between
-        target = scenario.reference.placement(tau)
-        return solve_placement(scenario.robot, target, between, tracking=scenario.first)

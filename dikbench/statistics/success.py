@@ -113,7 +113,7 @@ def rates(trials: pd.DataFrame, done: Mask) -> Rates:
     matrix = layout.fill(done.astype(float))
     cases = _cases(trials, layout)
     base = hierarchical_weights(cases)
-    rate, ran_there = _means(matrix, base), ~np.isnan(matrix)
+    rate, ran_there = weighted_means(matrix, base), ~np.isnan(matrix)
     whole: Mask = np.asarray(ran_there.all(axis=0))
     competes: Mask = whole & ~layout.contenders["formulation"].isin(ORACLES).to_numpy()
     nothing = np.full(len(rate), np.nan)
@@ -137,8 +137,8 @@ def paired_means(differences: Array, found: Rates) -> tuple[Array, Array, Array]
         differences: of each case and formulation, (n, k); NaN where one of the two has no value.
         found: the rates whose cases these are.
     """
-    means = _means(differences, found.base)
-    resampled = _means(differences, found.drawn)
+    means = weighted_means(differences, found.base)
+    resampled = weighted_means(differences, found.drawn)
     tails = ((1 - INTERVAL_COVERAGE) / 2, (1 + INTERVAL_COVERAGE) / 2)
     lower, upper = np.full((2, len(means)), np.nan)
     defined = ~np.isnan(means)
@@ -149,13 +149,15 @@ def paired_means(differences: Array, found: Rates) -> tuple[Array, Array, Array]
 def hierarchical_weights(cases: pd.DataFrame) -> Array:
     """Compute the weight of each case in the mean over `LEVELS` and the cases below, (n,)."""
     weights = np.ones(len(cases))
-    above = pd.Series(0, cases.index)
-    for level in LEVELS:
-        inside = above.groupby([above, cases[level]], sort=False).ngroup()
-        number = inside.groupby(above).transform("nunique")
-        weights /= number.to_numpy()
+    above: list[tuple[Any, ...]] = [()] * len(cases)
+    numbers = range(len(cases))
+    for column in (*(cases[level].astype(str).tolist() for level in LEVELS), numbers):
+        inside = [(*key, value) for key, value in zip(above, column, strict=True)]
+        count: dict[tuple[Any, ...], int] = {}
+        for key in dict.fromkeys(inside):
+            count[key[:-1]] = count.get(key[:-1], 0) + 1
+        weights /= [count[key] for key in above]
         above = inside
-    weights /= above.groupby(above).transform("size").to_numpy()
     return weights
 
 
@@ -166,7 +168,7 @@ def _cases(trials: pd.DataFrame, layout: TrialMatrix) -> pd.DataFrame:
     return found
 
 
-def _means(values: Array, weights: Array) -> Array:
+def weighted_means(values: Array, weights: Array) -> Array:
     """Compute the weighted mean of each column over its numbers, (k,)."""
     defined = ~np.isnan(values)
     with np.errstate(invalid="ignore"):

@@ -1,4 +1,4 @@
-"""Error, peak speed and violation against a parameter of a formulation, per family of scenarios."""
+"""Success, error and peak speed against a parameter of a formulation, per family of scenarios."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ from dikbench.report.selection.stored_motions import in_panels
 from dikbench.report.selection.sweeps import FEWEST, number
 from dikbench.results.selected import parameters_of
 from dikbench.selector import listed
+from dikbench.statistics.success import DONE
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,9 +75,9 @@ def draw_formulation_sweeps(ran: pd.DataFrame, target: Path) -> list[Figure]:
         file = file_name("formulation", sweep.formulation, sweep.parameter, place)
         caption = (
             f"{sweep.formulation}{f' ({sweep.others})' if sweep.others else ''} against its "
-            f"{sweep.parameter}, {how(sweep.rows)}: the median rms {name}, the largest peak "
-            "speed and the largest share of steps that pass a limit, over the scenarios of each "
-            "family; a failed trial counts as infinite, and infinity leaves a gap."
+            f"{sweep.parameter}, {how(sweep.rows)}: the share of the trials that succeed, the "
+            f"median rms {name} and the largest peak speed, over the scenarios of each family; a "
+            "trial that broke off counts as infinite, and infinity leaves a gap."
         )
         title = f"{sweep.formulation} against its {sweep.parameter}"
         figures.append(Figure(_draw(sweep, target, file), caption, title))
@@ -84,7 +85,7 @@ def draw_formulation_sweeps(ran: pd.DataFrame, target: Path) -> list[Figure]:
 
 
 def per_family(sweep: FormulationSweep) -> pd.DataFrame:
-    """Per family and value the median `error` [mm], the worst `peak` speed and `violating` [%]."""
+    """Compute per family and value `success` [%], the median `error` [mm], the worst `peak`."""
     column, _ = error_column(sweep.rows)
     rows = sweep.rows
     table = pd.DataFrame(
@@ -93,20 +94,20 @@ def per_family(sweep: FormulationSweep) -> pd.DataFrame:
             "value": rows["value"],
             "error": 1e3 * failures_at_infinity(rows, column),
             "peak": failures_at_infinity(rows, "velocity_peak_ratio"),
-            "violating": 100.0 * failures_at_infinity(rows, "violating_share"),
+            "success": 100.0 * rows["outcome"].isin(DONE).astype(float),
         }
     )
     groups = table.groupby(["family", "value"], sort=False)
-    taken = groups.agg({"error": "median", "peak": "max", "violating": "max"})
+    taken = groups.agg({"success": "mean", "error": "median", "peak": "max"})
     return taken.sort_index(level="value")
 
 
 def _draw(sweep: FormulationSweep, target: Path, file: str) -> str:
     _, name = error_column(sweep.rows)
     quantities = {
+        "success": "success [%]",
         "error": f"rms {name} [mm],\nmedian",
         "peak": "peak speed over limit,\nworst",
-        "violating": "steps that pass a limit [%],\nworst",
     }
     table, scale = per_family(sweep), ValueScale(sweep.rows["value"])
     table["error"] = table["error"].clip(lower=1e3 * LEAST_ERROR)
@@ -124,13 +125,13 @@ def _draw(sweep: FormulationSweep, target: Path, file: str) -> str:
         for axis, quantity in zip(line, quantities, strict=True):
             for place, kind in enumerate(families):
                 _curve(axis, scale, finite.loc[kind][quantity], short(kind, 22), place)
-        line[1].axhline(1.0, color="0.4", linewidth=0.7, zorder=1)
+        line[2].axhline(1.0, color="0.4", linewidth=0.7, zorder=1)
         line[-1].legend(loc="center left", bbox_to_anchor=(1.02, 0.5))
     for axis, label in zip(axes[0], quantities.values(), strict=True):
         axis.set_title(label)
-    logarithmic(axes[0, 0], "y")
+    axes[0, 0].set_ylim(-4, 104)
     logarithmic(axes[0, 1], "y")
-    axes[0, 2].set_ylim(-4, 104)
+    logarithmic(axes[0, 2], "y")
     scale.label(list(axes.flat))
     figure.supxlabel(f"{short(sweep.parameter)} of {short(sweep.formulation)}", fontsize=8)
     return save(figure, target, file)

@@ -18,7 +18,7 @@ from dikbench.arrays import Array, Mask
 from dikbench.report.drawing.figure import Figure
 from dikbench.report.drawing.panels import place_at_top, small_multiples
 from dikbench.report.drawing.style import label_decades, save
-from dikbench.report.selection.categories import CATEGORIES, OFF_COURSE, SLOW, categories
+from dikbench.report.selection.categories import CATEGORIES, categories
 from dikbench.report.selection.declared import with_unit
 from dikbench.report.selection.phase_grids import PhaseGrid, phase_grids
 from dikbench.report.selection.rows import error_column, failures_at_infinity, how, pages
@@ -30,10 +30,7 @@ PER_PAGE = 20
 GAP = 0.18
 """Between the column of 0, which is a case of its own, and the others [cells]."""
 
-FAILED = "#222222"
-
-CATEGORY_COLOURS = ("#e8f1e4", "#56B4E9", "#E69F00", "#D55E00", FAILED)
-CATEGORY_MARKS = ("", "s", "o", "v", "x")
+BROKE_OFF = CATEGORIES[-1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +53,7 @@ class _Map:
 def draw_phase_diagrams(ran: pd.DataFrame, target: Path) -> list[Figure]:
     """Draw for each grid of a family the error, the peak speed and the outcome per formulation."""
     figures = []
-    for number, grid in enumerate(phase_grids(ran.assign(outcome=categories(ran))), start=1):
+    for number, grid in enumerate(phase_grids(ran.assign(category=categories(ran))), start=1):
         maps = [m for m in _maps(grid) if any(np.isfinite(v).any() for v in m.values.values())]
         parts = pages(_formulations_in_order(grid.rows), PER_PAGE)
         for one in maps:
@@ -82,9 +79,9 @@ def _formulations_in_order(rows: pd.DataFrame) -> list[str]:
     worth = rows.assign(error=failures_at_infinity(rows, column))
     by_formulation = worth.groupby("formulation", sort=False)
     table = pd.DataFrame(
-        {"outcome": by_formulation["outcome"].mean(), "error": by_formulation["error"].median()}
+        {"category": by_formulation["category"].mean(), "error": by_formulation["error"].median()}
     )
-    order = table.sort_values(["outcome", "error"], kind="stable").index
+    order = table.sort_values(["category", "error"], kind="stable").index
     return sorted(order, key=lambda name: name not in ORACLES)
 
 
@@ -122,14 +119,11 @@ def _maps(grid: PhaseGrid) -> list[_Map]:
         _Map(
             "outcome",
             "outcome",
-            "What became of the trial, the worst over its seeds: failed; else violating a limit; "
-            f"else off course (more than {np.degrees(OFF_COURSE):.0f} deg from the wanted "
-            f"direction at some step); else slow (less than {100 * SLOW:.0f} % of the wanted "
-            "motion at some step); else ok.",
-            shown.values("outcome", "max"),
-            ListedColormap(list(CATEGORY_COLOURS)),
+            "What became of the trial, the worst over its seeds.",
+            shown.values("category", "max"),
+            ListedColormap([category.colour for category in CATEGORIES]),
             BoundaryNorm(np.arange(-0.5, len(CATEGORIES)), len(CATEGORIES)),
-            lambda value: CATEGORY_MARKS[round(value)],
+            lambda value: CATEGORIES[round(value)].mark,
         ),
     ]
 
@@ -151,19 +145,19 @@ def _draw(grid: PhaseGrid, formulations: Sequence[str], one: _Map, target: Path,
         0.2 * max(rows, 3),
         with_unit(grid.family, grid.across),
         with_unit(grid.family, grid.up),
-        top=0.68 if one.bar else 0.5,
+        top=0.68,
     )
-    outcome = grid.values("outcome", "max")
+    worst = grid.values("category", "max")
     for axis, formulation in zip(axes, formulations, strict=True):
         axis.grid(visible=False)
         axis.set_facecolor("white")
         for side in ("left", "bottom"):
             axis.spines[side].set_visible(False)
         values = one.values[formulation]
-        failed = np.isnan(values) & (outcome[formulation] == CATEGORIES.index("failed"))
+        failed = np.isnan(values) & (worst[formulation] == len(CATEGORIES) - 1)
         _cells(axis, edges, values, one.colours, one.norm)
         if failed.any():
-            _cells(axis, edges, np.where(failed, 1.0, np.nan), ListedColormap([FAILED]))
+            _cells(axis, edges, np.where(failed, 1.0, np.nan), ListedColormap([BROKE_OFF.colour]))
         _write(axis, centres, one, values, failed)
         axis.tick_params(length=0, pad=2)
         axis.tick_params(axis="x", labelrotation=90)
@@ -207,7 +201,7 @@ def _cells(
 def _write(axis: Any, centres: Array, one: _Map, values: Array, failed: Mask) -> None:
     for (row, column), value in np.ndenumerate(values):
         if failed[row, column]:
-            text, colour = CATEGORY_MARKS[-1], "white"
+            text, colour = BROKE_OFF.mark, "white"
         elif np.isfinite(value):
             text, colour = one.text(value), _readable_on(one.colours(one.norm(value)))
         else:
@@ -236,15 +230,16 @@ def _readable_on(background: Any) -> str:
 def _key(figure: Any, one: _Map) -> None:
     """The colour bar, or what the categories are called."""
     if not one.bar:
-        names = [
-            f"{name} ({mark})" if mark else name
-            for name, mark in zip(CATEGORIES, CATEGORY_MARKS, strict=True)
-        ]
         handles = [
-            Patch(facecolor=colour, edgecolor="0.6", linewidth=0.4, label=name)
-            for colour, name in zip(CATEGORY_COLOURS, names, strict=True)
+            Patch(
+                facecolor=category.colour,
+                edgecolor="0.6",
+                linewidth=0.4,
+                label=f"{category.name} ({category.mark})" if category.mark else category.name,
+            )
+            for category in CATEGORIES
         ]
-        figure.legend(handles=handles, loc="upper center", ncols=len(handles))
+        figure.legend(handles=handles, loc="upper center", ncols=4)
         return
     bar = figure.colorbar(
         ScalarMappable(one.norm, one.colours),

@@ -1,31 +1,59 @@
-"""What became of a trial, in one word: the categories of a phase diagram."""
+"""What became of trials, in few words and colours: the categories of figures."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Final
 
-import numpy as np
 import pandas as pd
 
-CATEGORIES: Final = ("ok", "slow", "off course", "violating", "failed")
-"""From the best to the worst; a trial is the worst that applies."""
+from dikbench.metrics import Outcome
 
-SLOW: Final = 0.9
-"""A trial is slow if at some step it makes less than this share of the wanted motion ..."""
 
-OFF_COURSE: Final = np.radians(10.0)
-"""... off course if at some step it moves farther than this from the wanted direction [rad] ..."""
+@dataclass(frozen=True)
+class Category:
+    """Outcomes that are drawn alike.
 
-VIOLATING: Final = 0.0
-"""... and violating if more than this share of its steps pass a limit (by > 1e-4)."""
+    Attributes:
+        name: in legends.
+        outcomes: which.
+        colour: told apart by the colour-blind, and in grey.
+        mark: what is written where a cell is too small for its name.
+    """
+
+    name: str
+    outcomes: frozenset[Outcome]
+    colour: str
+    mark: str
+
+
+CATEGORIES: Final = (
+    Category("success", frozenset({Outcome.SUCCESS, Outcome.RECOVERED}), "#cfe8cf", ""),
+    Category("chattering", frozenset({Outcome.CHATTERING}), "#F0E442", "~"),
+    Category("late or unfinished", frozenset({Outcome.LATE, Outcome.UNFINISHED}), "#56B4E9", "s"),
+    Category(
+        "left the path", frozenset({Outcome.LEFT_PATH, Outcome.NOT_RECOVERED}), "#E69F00", "o"
+    ),
+    Category("limit broken", frozenset({Outcome.LIMIT_BROKEN}), "#D55E00", "v"),
+    Category("collided", frozenset({Outcome.COLLIDED}), "#8C2D04", "c"),
+    Category(
+        "broke off", frozenset({Outcome.DIVERGED, Outcome.DID_NOT_RUN}), "#222222", "x"
+    ),
+)  # fmt: skip
+"""From the best to the worst; every outcome is of one."""
+
+_PLACES: Final[Mapping[str, int]] = MappingProxyType(
+    {
+        outcome.value: place
+        for place, category in enumerate(CATEGORIES)
+        for outcome in category.outcomes
+    }
+)
 
 
 def categories(rows: pd.DataFrame) -> pd.Series:
-    """The outcome of each trial, as its place in `CATEGORIES`."""
-    conditions = [
-        rows["status"].ne("ok"),
-        rows["violating_share"].gt(VIOLATING),
-        rows["direction_error_max_rad"].gt(OFF_COURSE),
-        rows["progress_min"].lt(SLOW),
-    ]
-    return pd.Series(np.select(conditions, [4, 3, 2, 1], default=0), index=rows.index)
+    """Return the place of each trial's outcome in `CATEGORIES`; NaN where there is none."""
+    found: pd.Series = rows["outcome"].map(_PLACES).astype(float)
+    return found

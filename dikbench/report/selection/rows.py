@@ -27,6 +27,18 @@ def that_ran(trials: pd.DataFrame) -> pd.DataFrame:
     return ran
 
 
+def names_of_contenders(rows: pd.DataFrame) -> dict[tuple[str, str], str]:
+    """Return how formulations with their solvers are called; alone where there is one solver."""
+    pairs = rows[["formulation", "solver"]].drop_duplicates()
+    solvers = pairs["formulation"].value_counts()
+    return {
+        (formulation, solver): (
+            contender_name(formulation, solver) if solvers[formulation] > 1 else formulation
+        )
+        for formulation, solver in pairs.itertuples(index=False, name=None)
+    }
+
+
 def one_solver_each(ran: pd.DataFrame) -> pd.DataFrame:
     """The rows of each formulation with the first of its solvers: curves that would coincide."""
     first = ran.groupby("formulation", sort=False)["solver"].transform("first")

@@ -8,7 +8,7 @@ from math import sqrt
 from typing import Any, Final
 
 import numpy as np
-from scipy.spatial.distance import cdist
+from scipy.spatial import cKDTree
 
 from dikbench.arrays import Array, Indices
 from dikbench.problem.embedding import Embedding
@@ -37,8 +37,11 @@ motion: `dls[damping=0.05]` took 2.63 of the nominal duration of `pick-and-place
 1.22; exact motions and those held to a share of the speed take as long at either.
 """
 
-PIECES_PER_BLOCK: Final = 16
-"""Number of pieces that are searched together for the nearest point."""
+SAME_DISTANCE_M2: Final = 1e-18
+"""Difference of two square distances up to which they are one."""
+
+FIRST_NEIGHBOUR_COUNT: Final = 3
+"""Number of nearest samples that are searched first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +94,7 @@ class EmbeddedPath:
         return share, np.einsum("...i,...i->...", away, away)
 
     def nearest(self, points: Array) -> tuple[Array, Indices, Array]:
-        """Find the nearest points of the path as a set.
+        """Find the nearest points of the path as a set; of equally near ones the first.
 
         Args:
             points: (n, d) [m].
@@ -99,49 +102,43 @@ class EmbeddedPath:
         Returns:
             Distances (n,) [m], the pieces that they are on (n,), and the shares of those (n,).
         """
-        middles, reaches, pieces = self._blocks
-        away = cdist(points, self.points[middles])
-        each = np.arange(len(points))
-        first: Indices = away.argmin(axis=1)
-        squares, nearest, shares = self._nearest_of(points, pieces[first])
-        # Another block may only come nearer if its ball does.
-        away -= reaches
-        open_ = away <= np.sqrt(squares)[:, None]
-        open_[each, first] = False
-        which, blocks = np.nonzero(open_)
-        if len(which):
-            found = self._nearest_of(points[which], pieces[blocks])
-            order = np.lexsort((found[0], which))
-            asking, begins = np.unique(which[order], return_index=True)
-            best = order[begins]
-            nearer = found[0][best] < squares[asking]
-            asking, best = asking[nearer], best[nearer]
-            squares[asking], nearest[asking], shares[asking] = (part[best] for part in found)
+        tree, most, long = self._tree
+        squares, shares = np.full((2, len(points)), np.inf)
+        nearest, open_ = np.zeros(len(points), dtype=int), np.arange(len(points))
+        asked, count = np.column_stack([points, np.zeros(len(points))]), FIRST_NEIGHBOUR_COUNT
+        while len(open_):
+            count = min(count, tree.n)
+            away, ends = tree.query(asked[open_], count)
+            away, ends = away.reshape(-1, count), ends.reshape(-1, count)
+            pieces = long[np.hstack([np.maximum(ends - 1, 0), np.minimum(ends, len(long) - 1)])]
+            pieces.sort(axis=1)
+            share, square = self.feet(points[open_, None], pieces)
+            squares[open_] = square.min(axis=1)
+            best = (square <= squares[open_, None] + SAME_DISTANCE_M2).argmax(axis=1)[:, None]
+            nearest[open_] = np.take_along_axis(pieces, best, axis=1)[:, 0]
+            shares[open_] = np.take_along_axis(share, best, axis=1)[:, 0]
+            if count == tree.n:
+                break
+            open_ = open_[squares[open_] >= away[:, -1] ** 2 - most]
+            count *= 3
         return np.sqrt(squares), nearest, shares
 
-    def _nearest_of(self, points: Array, pieces: Indices) -> tuple[Array, Indices, Array]:
-        """Find the nearest of some pieces (n, m) to each point: square distance, piece, share."""
-        share, square = self.feet(points[:, None], pieces)
-        each, best = np.arange(len(points)), square.argmin(axis=1)
-        return square[each, best], pieces[each, best], share[each, best]
-
     @cached_property
-    def _blocks(self) -> tuple[Indices, Array, Indices]:
-        """Blocks of pieces that follow each other and make up the path as a set.
+    def _tree(self) -> tuple[Any, float, Indices]:
+        """The ends of the pieces that make up the path as a set, but for those without length.
 
-        The number of a sample in the middle of each, (b,); how far its pieces are from that one at
-        most, (b,) [m]; and their numbers, (b, m).
+        A tree of the ends, the number i that of piece i - 1 and the start of piece i, with another
+        coordinate so that square distances less a constant [m^2] are those that the two pieces have
+        at least, |x - end|^2 - (length / 2)^2; the constant; and the numbers of the pieces, (b,).
         """
         long = np.flatnonzero(self.squares[: self.once] > 0)
         if not len(long):
             long = np.zeros(1, dtype=int)
-        count = -(-len(long) // PIECES_PER_BLOCK)
-        places = np.arange(count * PIECES_PER_BLOCK).reshape(count, PIECES_PER_BLOCK)
-        pieces: Indices = long[np.minimum(places, len(long) - 1)]
-        middles = pieces[:, PIECES_PER_BLOCK // 2]
-        ends = np.stack([self.points[pieces], self.points[pieces + 1]])
-        away = np.linalg.norm(ends - self.points[middles][:, None], axis=3)
-        return middles, away.max(axis=(0, 2)), pieces
+        halves = self.squares[long] / 4
+        halves = np.maximum(np.append(halves, 0.0), np.append(0.0, halves))
+        most = float(halves.max())
+        ends = self.points[np.append(long, long[-1] + 1)]
+        return cKDTree(np.column_stack([ends, np.sqrt(most - halves)])), most, long
 
     def latest_nearest(self, point: Array, first: float, last: float) -> float:
         """Find the nominal time of the nearest point of a part of the path [s].
@@ -178,6 +175,12 @@ class EmbeddedPath:
         scale: Array = np.where(resting, 0.0, 1 / np.where(resting, 1.0, self.squares))
         return scale, resting.astype(float)
 
+    @cached_property
+    def _directions(self) -> Array:
+        """Unit vectors along the pieces, (f - 1, d); 0 where one has no length."""
+        lengths = np.sqrt(self.squares)
+        return self.pieces / np.where(lengths > NEGLIGIBLE_PIECE_M, lengths, np.inf)[:, None]
+
     def tangents(self, pieces: Indices, shares: Array) -> Array:
         """Interpolate the unit tangent at points of pieces, linearly between their middles.
 
@@ -188,8 +191,7 @@ class EmbeddedPath:
         Returns:
             (n, d); 0 on a piece without length. Where the path turns back it is one of the two.
         """
-        lengths = np.sqrt(self.squares)
-        directions = self.pieces / np.where(lengths > NEGLIGIBLE_PIECE_M, lengths, np.inf)[:, None]
+        directions = self._directions
         other = np.clip(pieces + np.where(shares < 0.5, -1, 1), 0, len(directions) - 1)
         own, next_ = directions[pieces], directions[other]
         part = np.abs(shares - 0.5)[:, None]

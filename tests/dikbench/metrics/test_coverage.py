@@ -20,6 +20,8 @@ def random_case(seed: int) -> tuple[Array, Array, Indices, Array]:
     samples = np.cumsum(random.normal(size=(count, d)) * random.choice([1e-3, 1e-2]), axis=0)
     if random.random() < 0.3:  # a way back on the same samples, with a rest
         samples = np.concatenate([samples, np.repeat(samples[-1:], 5, axis=0), samples[::-1]])
+    if random.random() < 0.3:  # laps
+        samples = np.concatenate([samples, samples[::-1]] * 3)
     targets = np.sort(random.integers(0, len(samples), n + 1))
     if random.random() < 0.3:
         targets[:] = len(samples) - 1
@@ -30,11 +32,11 @@ def random_case(seed: int) -> tuple[Array, Array, Indices, Array]:
     return samples, points, targets, apart
 
 
-def made(case: tuple[Array, Array, Indices, Array], radius: float = 0.005) -> Coverage:
-    """The coverage of a case; targets are there as soon as they may be covered."""
+def made(case: tuple[Array, Array, Indices, Array], delay: int = 0) -> Coverage:
+    """The coverage of a case; targets are there so many instants after they may be covered."""
     samples, points, targets, apart = case
-    there = np.searchsorted(targets, np.arange(len(samples)))
-    return Coverage(samples, points, targets, np.minimum(there, len(points) - 1), apart, radius)
+    there = np.searchsorted(targets, np.arange(len(samples))) + delay
+    return Coverage(samples, points, targets, np.minimum(there, len(points) - 1), apart)
 
 
 def distance(sample: Array, start: Array, end: Array) -> float:
@@ -64,7 +66,8 @@ def by_definition(case: tuple[Array, Array, Indices, Array], tolerance: float) -
 def test_samples_are_covered_as_defined(seed: int, tolerance: float) -> None:
     """Whatever the path, the motion, the targets and the other frame; at any tolerance."""
     case = random_case(seed)
-    assert made(case).instants(tolerance) == by_definition(case, tolerance)
+    for delay in (0, 3):
+        assert made(case, delay).instants(tolerance).tolist() == by_definition(case, tolerance)
 
 
 @settings(max_examples=60, deadline=None)
@@ -75,7 +78,8 @@ def test_the_tolerance_needed_is_where_the_definition_turns(seed: int, data: st.
     samples, points, targets, _ = case
     sample = data.draw(st.integers(0, len(samples) - 1))
     until = data.draw(st.integers(0, len(points) - 1))
-    needed, again = made(case).needed([(sample, until), (sample // 2, until)])
+    coverage = made(case, data.draw(st.integers(0, 3)))
+    needed, again = coverage.needed([(sample, until), (sample // 2, until)])
 
     def holds(tolerance: float, which: int = sample) -> bool:
         covered = by_definition(case, tolerance)
@@ -95,7 +99,7 @@ def test_the_tolerance_needed_is_where_the_definition_turns(seed: int, data: st.
 def test_a_larger_tolerance_covers_no_less_and_no_later(seed: int) -> None:
     """Sample by sample."""
     coverage = made(random_case(seed))
-    before: list[int] = []
+    before: Indices = np.empty(0, dtype=int)
     for tolerance in (5e-4, 1e-3, 5e-3, 0.02, 0.1, 0.25):
         covered = coverage.instants(tolerance)
         assert len(covered) >= len(before)
@@ -121,7 +125,7 @@ def test_a_fast_step_misses_no_sample() -> None:
     samples = np.linspace([0.0, 0.0], [0.4, 0.0], 41)
     points = np.array([[0.0, 0.0], [0.2, 0.0], [0.4, 0.0]])
     coverage = made((samples, points, np.array([0, 20, 40]), np.zeros(3)))
-    assert coverage.instants(1e-3) == [0, *[1] * 20, *[2] * 20]
+    assert coverage.instants(1e-3).tolist() == [0, *[1] * 20, *[2] * 20]
     assert coverage.needed([(40, 2)])[0] == pytest.approx(0.0, abs=ROUNDING)
 
 

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
 import pinocchio as pin
 import pytest
+from makers.scenarios import run_of
 
 from dikbench.arrays import Array
-from dikbench.metrics import Motion
+from dikbench.errors import DikbenchError
+from dikbench.metrics import Motion, motion_of
 from dikbench.metrics.motion_of_trace import rotation_angles
+from dikbench.plugins.building import make_scenario
 
 # --- the smallest singular value
 
@@ -129,3 +133,17 @@ def test_rotation_angles_of_many_different_pairs() -> None:
     found = rotation_angles(first, second)
     assert found == pytest.approx(np.linalg.norm(logarithms, axis=1))
     assert found.min() < 0.5 < 3.0 < found.max()
+
+
+# --- a trace that is not the scenario's
+
+
+@pytest.mark.parametrize("part", ["q", "applied"])
+def test_a_trace_of_another_robot_is_one_line(part: str) -> None:
+    """Of a robot with another number of joints."""
+    scenario = make_scenario("step")
+    trace = run_of("pinv", scenario).trace
+    other = replace(trace, **{part: getattr(trace, part)[:, :-1]})
+    message = rf"^trace of another robot: {part} has shape \(\d+, \d\); valid for \w+: .*$"
+    with pytest.raises(DikbenchError, match=message):
+        motion_of(other, scenario)

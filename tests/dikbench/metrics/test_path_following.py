@@ -104,6 +104,18 @@ def test_the_nearest_point_of_a_path_is_the_least_over_its_pieces(seed: int) -> 
     np.testing.assert_allclose(np.linalg.norm(asked - feet, axis=1), distances, atol=1e-12)
 
 
+def test_of_a_path_that_runs_over_itself_the_first_pieces_count() -> None:
+    """There and back on the same samples: whichever copy a search comes upon, it is the first."""
+    there = np.column_stack([np.linspace(0, 1, 60) ** 3, np.zeros(60)])
+    points = np.concatenate([there, there[-2::-1]])
+    arcs = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    path = EmbeddedPath(np.arange(119.0), points, arcs, 118)
+    asked = np.column_stack([np.linspace(0, 1, 500), np.full(500, 0.01)])
+    distances, pieces, _ = path.nearest(asked)
+    assert (pieces < 59).all()
+    np.testing.assert_allclose(distances, 0.01, atol=1e-12)
+
+
 def test_a_foot_that_slips_counts_like_the_hand() -> None:
     """All of the humanoid is carried 3 cm sideways: hand and feet are off, by the same."""
     scenario = scenario_of("humanoid[laps=1]")

@@ -8,13 +8,14 @@ from math import asin, pi, sqrt
 import numpy as np
 import pytest
 from makers.scenarios import RATE, planar_scenario
+from scipy.optimize import minimize
 
 from dikbench.arrays import Array
 from dikbench.plugins.building import make_scenario
 from dikbench.problem.constraints import CollisionConstraint
 from dikbench.robots.collision.obstacles import SphereObstacle
 from dikbench.robots.kinematics import placements
-from dikbench.scenario import Scenario, joint_oracle, measure_motion
+from dikbench.scenario import Scenario, joint_oracle, measure_motion, placement_of
 from dikbench.scenario.infeasible import infeasible_because
 from dikbench.scenario.situation import Situation
 
@@ -48,6 +49,32 @@ def test_a_line_out_of_reach_is_no_and_says_until_when_it_can_be_followed(robot:
     assert touched.feasible == "unknown"
     still = make_scenario(f"workspace-boundary[robot={robot},extent=1.2,path=still]")
     assert (still.feasible, still.followable_until, still.comes_back) == ("no", 0.0, False)
+
+
+def test_a_corner_of_the_lwrs_hexagon_is_out_of_reach_and_a_search_agrees() -> None:
+    """Too near to the shoulder: bounded minimisation from many seeds stays 2 cm away."""
+    scenario = make_scenario("hexagon[robot=lwr,laps=1]")
+    assert scenario.feasible == "no"
+    assert scenario.motion is not None
+    limits = scenario.robot.limits.position
+    assert limits is not None
+    tau = scenario.motion.instants[scenario.motion.margin.argmin()]
+    corner = scenario.reference.placement(tau).translation
+    random = np.random.default_rng(0)
+
+    def away(q: Array) -> float:
+        return float(np.square(placement_of(scenario.robot, q).translation - corner).sum())
+
+    found = [
+        minimize(
+            away,
+            random.uniform(limits.lower, limits.upper),
+            bounds=list(zip(limits.lower, limits.upper, strict=True)),
+            method="L-BFGS-B",
+        ).fun
+        for _ in range(15)
+    ]
+    assert 0.02 < sqrt(min(found)) < 0.03
 
 
 # --- a rigid clearance
@@ -111,9 +138,14 @@ def test_what_the_tolerance_mends_is_not_infeasible() -> None:
 
 
 def test_an_arm_with_null_space_is_not_judged_by_one_motion() -> None:
-    """The same motion of a planar arm of four joints: nothing is proven."""
-    scenario = make_scenario("joint-limit-crossing[robot=lwr]")
-    assert scenario.feasible == "unknown"
+    """Where another one is known, and is taken away; and where no posture is excluded."""
+    hexagon = make_scenario("hexagon[robot=planar4r]")
+    assert hexagon.feasible == "time"
+    assert infeasible_because(replace(hexagon, feasible="unknown", witness=None)) == ""
+    # The Panda's wrist turned over reaches the same placements; an elbow's angle is its reach.
+    assert make_scenario("joint-limit-crossing[robot=panda]").feasible == "unknown"
+    bent = make_scenario("joint-limit-crossing[robot=lwr]")
+    assert "no posture inside the position limits" in bent.infeasible_because
 
 
 def test_a_branch_through_a_singularity_proves_nothing() -> None:
