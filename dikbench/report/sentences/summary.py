@@ -120,6 +120,6 @@ def _basis(trials: pd.DataFrame) -> str:
         "with a seed) that a known motion can do. Who is stopped by a limit that it is told of, by "
         f"a collision or a failure in more than {100 * MOST_BROKEN_SHARE:g} % of them, or succeeds "
         f"overall in at most {100 * SMALLEST_SHARE_OF_BEST:g} % of what the best of the others "
-        "does, may not be first; first is who of the rest cannot be told apart from the best (95 % paired "
-        "intervals) and is not slower than another of them."
+        "does, may not be first; first is who of the rest cannot be told apart from the best "
+        "(95 % paired intervals) and is not slower than another of them."
     )

@@ -192,8 +192,8 @@ def _notes(trials: pd.DataFrame) -> list[str]:
         "Who may be starred is stopped by a limit that it is told of, a collision or a failure in "
         f"at most {100 * MOST_BROKEN_SHARE:g} % of all trials, and successful overall in more than "
         f"{100 * SMALLEST_SHARE_OF_BEST:g} % of what the best of those is. A star: not told apart "
-        "from the best of those here (ties are all starred), and not slower than another of them by a "
-        f"ratio of more than {FASTER:g}.",
+        "from the best of those here (ties are all starred), and not slower than another of them "
+        f"by a ratio of more than {FASTER:g}.",
         "In brackets stands the 95 % interval of the difference to the best of those that may be "
         "starred, in points, from a bootstrap of paired trials; none where it has no width.",
     ]
