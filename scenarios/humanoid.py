@@ -101,7 +101,6 @@ class Humanoid(Family):
         motion = self.exact_motion(robot, reference, q0, together)
         sigma, slip, room = _measured(robot, motion, together)
         claims = (
-            Claim("number of velocities", robot.nv, at_least=31),
             Claim("smallest singular value of hand and feet (m, rad)", sigma, at_least=0.05),
             Claim("way that the feet move (m, rad)", slip, at_most=1e-8),
             Claim("room of the centre of mass above the feet [m]", room, at_least=0.03),

@@ -91,7 +91,6 @@ class JointLimitApproach(Family):
             Claim("room before the limit over the braking distance", before / braking, 1.0),
             # Less than half a turn beyond it, or the shortest rotation to the target changes.
             Claim("deepest margin of the motion [rad]", deepest, -3.0, -0.8 * self.depth),
-            Claim("duration over the time to stop", duration / stopped, at_least=1.0),
             *usual_claims(motion, sigma_min=0.03),
             *usual_claims(motion, speed=(0.9 * self.speed, 0.999)),
         )

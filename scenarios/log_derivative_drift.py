@@ -88,15 +88,17 @@ class LogDerivativeDrift(Family):
         motion = joint_oracle(robot, straight, samples(4 * period, self.dt))
         length = np.linalg.norm(np.diff(motion.q[:, :2], axis=0), axis=1).sum() / self.distance
         screw = pin.log6(first.actInv(poses[1]))
-        weight, detour = self.orientation_cost**2, _length(screw) / self.distance
+        detour = _length(screw) / self.distance
         claims = (
             Claim("length of the straight way over the distance", length, 2.99, 3.01),
             # Damping increases the detour of the screw.
             Claim("length of the screw over the distance", detour, 1.15),
             Claim("yaw between the poses [rad]", abs(screw.angular[2]), at_most=3.05),
-            Claim("weight of the orientation", weight, at_most=1.01e-6),
         )
-        tracking, zero = PoseTask(gain=self.gain, weight=np.array([1.0, 1.0, weight])), np.zeros(6)
+        tracking, zero = (
+            PoseTask(gain=self.gain, weight=np.array([1.0, 1.0, self.orientation_cost**2])),
+            np.zeros(6),
+        )
         reference = Reference(4 * period, placement, lambda tau: zero, moving=False)
         return Case(reference, q0, motion, claims, tracking=tracking, v0=np.zeros(3))
 

@@ -18,6 +18,8 @@ RENAMING_VERSIONS: Final = ("1", "2")
 
 NUMBERS: Final = (*METRICS, *OUTCOME_NUMBERS, *SEES, "wall_time_s", "control_time_s")
 
+EMPTY_TEXT: Final = "TEXT NOT NULL DEFAULT ''"
+
 TABLES: Final = f"""
 CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL);
 CREATE TABLE runs (id INTEGER PRIMARY KEY, manifest TEXT NOT NULL);
@@ -27,7 +29,7 @@ CREATE TABLE trials (
   formulation TEXT NOT NULL, solver TEXT NOT NULL, scenario TEXT NOT NULL,
   plant TEXT NOT NULL, reference TEXT NOT NULL, seed INTEGER NOT NULL,
   status TEXT NOT NULL, message TEXT NOT NULL, steps INTEGER NOT NULL,
-  {", ".join(f"{name} TEXT" for name in OUTCOME_TEXTS)},
+  {", ".join(f"{name} {EMPTY_TEXT}" for name in OUTCOME_TEXTS)},
   {", ".join(f"{name} REAL" for name in NUMBERS)},
   environment TEXT REFERENCES environments (id),
   run INTEGER NOT NULL REFERENCES runs (id),

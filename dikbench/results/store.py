@@ -16,7 +16,7 @@ import pandas as pd
 from dikbench.errors import DikbenchError
 from dikbench.metrics import OUTCOME_TEXTS
 from dikbench.results.columns import KEYS, RENAMED_METRICS, TIMED, TIMES, TRIAL
-from dikbench.results.schema import NUMBERS, SCHEMA_VERSION, TABLES, migrate
+from dikbench.results.schema import EMPTY_TEXT, NUMBERS, SCHEMA_VERSION, TABLES, migrate
 from dikbench.results.versions import is_outdated, versions_of_rows
 from dikbench.scenario.oracle import ORACLES
 from dikbench.study.identity import timing_id, timing_id_today, trial_id_today
@@ -192,7 +192,7 @@ class Store:
     def record_trial(self, row: Mapping[str, Any], run: int, position: int) -> None:
         """Commit the row of a finished trial, replacing an earlier one."""
         columns = ("id", *KEYS, "steps", *OUTCOME_TEXTS, *NUMBERS, "environment")
-        values = {name: row.get(name) for name in columns}
+        values = {name: row.get(name, "" if name in OUTCOME_TEXTS else None) for name in columns}
         self._insert("trials", {**values, "run": run, "position": position})
 
     def record_metrics(self, trial: str, metrics: Mapping[str, Any]) -> None:
@@ -333,7 +333,7 @@ class Store:
             with self._guarded(), self._transaction():
                 migrate(self._database, found["schema"], columns)
         for name in missing:
-            kind = "TEXT" if name in OUTCOME_TEXTS else "REAL"
+            kind = EMPTY_TEXT if name in OUTCOME_TEXTS else "REAL"
             self._database.execute(f"ALTER TABLE trials ADD COLUMN {name} {kind}")
 
     def _check_untouched(self) -> None:

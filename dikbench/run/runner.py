@@ -157,7 +157,8 @@ def time_study(study: Study, out: Path, command: str) -> ResultsFolder:
 def _check_rerun(rerun: str, planned: Sequence[PlannedTrial]) -> None:
     names = {text for p in planned for text in _names(p.trial)}
     if rerun not in {"", *RERUNS, *names}:
-        raise unknown("what to rerun", rerun, [*RERUNS, *sorted(names)])
+        where = f"({', '.join(RERUNS)}, or a formulation, scenario or solver of the study)"
+        raise unknown("what to rerun", rerun, [*RERUNS, *names], where)
 
 
 def _names(trial: Trial) -> set[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar, Final
+from typing import Annotated, Any, ClassVar, Final
 
 import numpy as np
 import pinocchio as pin
@@ -13,6 +13,7 @@ from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.parameters import Parameters, Range, parameters_of
 from dikbench.problem.constraints import Constraint
+from dikbench.problem.embedding import embedding_of
 from dikbench.problem.tasks import PoseTask, Task, TrackingTask, TrackingTogether
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.robot import Robot
@@ -30,7 +31,14 @@ from dikbench.scenario.scenario import Judged, Scenario, first_level
 from dikbench.scenario.situation import Situation, situation_of
 from dikbench.scenario.tolerance import sampling_floor, tolerance_above
 from dikbench.scenario.variation import NO_VARIATION, Perturbation, Variation
-from dikbench.scenario.witness import Feasible, Witness, beyond, followable, witness_of
+from dikbench.scenario.witness import (
+    Feasible,
+    Witness,
+    beyond,
+    does_the_task,
+    followable,
+    witness_of,
+)
 
 RETURN_TIME_CONSTANTS: Final = 5.0
 """Time constants 1/gain of the tracking task for which a time-indexed run goes on with the target
@@ -117,6 +125,25 @@ class Family(Parameters, ABC):
     judged: ClassVar[Judged] = "path"
     longest_path_run: ClassVar[float] = 5.0
 
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Refuse class variables of another kind than figures, checks and seeds need.
+
+        Raises:
+            DikbenchError: if there is one.
+        """
+        super().__init_subclass__(**options)
+        wanted: dict[str, tuple[bool, str]] = {
+            "variation": (isinstance(cls.variation, Variation), "Variation(start=0.1)"),
+            "robots": (_names(cls.robots), '("panda", "ur5")'),
+            "grid": (cls.grid is None or (_names(cls.grid) and len(cls.grid) == 2), '("x", "y")'),
+        }
+        for name, (fits, example) in wanted.items():
+            if not fits:
+                raise DikbenchError(
+                    f"class {cls.__qualname__}: {name} = {getattr(cls, name)!r} is not valid; "
+                    f"valid: such as {name} = {example}"
+                )
+
     @abstractmethod
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """Make the family's part of a scenario.
@@ -148,7 +175,7 @@ class Family(Parameters, ABC):
             tasks = secondary_tasks(robot, case.q0, tracking)
         if v0 is None:
             v0 = start_velocity(robot, case.reference, case.q0, first_level(tracking, tasks))
-        witness = _first_witness(case, robot, v0)
+        witness = _first_witness(case, robot, tracking, v0)
         feasible, duration = _feasible(case.reference, witness), case.reference.duration
         until, comes_back = case.followable_until, case.comes_back
         if witness is None and case.motion is not None:
@@ -209,12 +236,13 @@ class Family(Parameters, ABC):
         return oracle_motion(robot, reference, q0, instants, tracking)
 
 
-def _first_witness(case: Case, robot: Robot, v0: Array) -> Witness | None:
+def _first_witness(case: Case, robot: Robot, tracking: TrackingTask, v0: Array) -> Witness | None:
     """Return the first of a case's joint motions that is a witness; None where none is."""
+    reference = case.reference
+    embedding = embedding_of(tracking, robot, reference.placement(0.0).rotation)
     for motion in (case.motion, case.witness):
-        if motion is not None:
-            duration = case.reference.duration
-            witness = witness_of(robot, motion, case.constraints, v0, duration)
+        if motion is not None and does_the_task(robot, motion, reference, embedding):
+            witness = witness_of(robot, motion, case.constraints, v0, reference.duration)
             if witness is not None:
                 return witness
     return None
@@ -237,6 +265,10 @@ def _lateness(motion: OracleMotion | None, witness: Witness | None) -> float:
     if motion is None:
         return 0.0
     return float((np.diff(motion.instants) * np.maximum(motion.speed_ratio - 1, 0.0)).sum())
+
+
+def _names(value: object) -> bool:
+    return isinstance(value, tuple) and all(isinstance(name, str) for name in value)
 
 
 def _check_case(case: object) -> None:

@@ -10,8 +10,11 @@ import numpy as np
 
 from dikbench.arrays import Array, Mask
 from dikbench.problem.constraints import CollisionConstraint, Constraint, TorqueConstraint
+from dikbench.problem.embedding import Embedding
+from dikbench.robots.kinematics import placements
 from dikbench.robots.robot import Robot
 from dikbench.scenario.oracle import OracleMotion
+from dikbench.scenario.reference.reference import Reference
 
 Feasible = Literal["time", "path", "no", "unknown"]
 """What a motion is known for that keeps all limits: it follows by the clock; it follows if the path
@@ -28,6 +31,9 @@ INSIDE_SHARE: Final = 0.5
 
 ROUNDING_M: Final = 1e-9
 """A distance that falls short of its margin by this keeps it."""
+
+OFF_PATH_M: Final = 1e-6
+"""A motion that is off its path by this follows it."""
 
 SLOWEST_PACE: Final = 1e-3
 """Smallest share of the nominal speed at which torques are tried."""
@@ -96,6 +102,21 @@ def witness_of(
         if not witness.by_clock or limit.usage(changes / between[:, None]).max() > 1.0:
             return None
     return witness
+
+
+def does_the_task(
+    robot: Robot, motion: OracleMotion, reference: Reference, embedding: Embedding
+) -> bool:
+    """Say whether the samples of a joint motion are on the path, or its end at a target at rest."""
+    times, q = (
+        (motion.instants, motion.q) if reference.moving else ([reference.duration], motion.q[-1:])
+    )
+    wanted = np.array([reference.placement(tau).homogeneous for tau in times])
+    made, (a, b) = placements(robot, robot.frame_id, q), (slice(0, 3), 3)
+    off = embedding.points(made[:, a, a], made[:, a, b]) - embedding.points(
+        wanted[:, a, a], wanted[:, a, b]
+    )
+    return bool(np.linalg.norm(off, axis=1).max() <= OFF_PATH_M)
 
 
 def beyond(

@@ -69,5 +69,6 @@ def parse_tolerance(text: str) -> Tolerance:
             f"of the time in A, such as {name}=20%"
         )
     if name not in {*METRICS, SUCCESS, *COMPARED}:
-        raise unknown("metric", name, [*METRICS, SUCCESS, *COMPARED], f"in tolerance {text!r}")
+        known = [*METRICS, SUCCESS, *COMPARED]
+        raise unknown("metric", name, known, f"in tolerance {text!r}", "dikbench list metrics")
     return Tolerance(name, bound, percent and name != SUCCESS)

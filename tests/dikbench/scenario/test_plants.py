@@ -17,7 +17,7 @@ from dikbench.plugins.building import make_scenario
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.limits import Limits
 from dikbench.scenario import Scenario
-from dikbench.scenario.plant import PLANTS, Ideal, Plant, Saturating
+from dikbench.scenario.plant import PLANTS, Ideal, Plant, Protective, Saturating
 
 REACH = make_scenario("reach")
 """A Panda, whose v0 is made different from 0 here."""
@@ -58,7 +58,7 @@ def test_without_limits_the_saturating_plant_is_ideal() -> None:
     limits: Limits = free.limits.at(free.q0)
     v = np.array([1e3, -1e3, 0.0])
     assert np.array_equal(Saturating().drive(v, limits, 0.01), v)
-    assert PLANTS == {"ideal": Ideal, "saturating": Saturating}
+    assert PLANTS == {"ideal": Ideal, "saturating": Saturating, "protective": Protective}
 
 
 @pytest.mark.parametrize("kind", PLANTS.values())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from dikbench.problem.constraints import CollisionConstraint
 from dikbench.robots.kinematics import placements
 from dikbench.scenario import Scenario
 from dikbench.scenario.family import certified_robots
+from dikbench.scenario.witness import does_the_task
 from scenarios import SCENARIOS
 
 FOUND = [
@@ -32,6 +34,7 @@ EVERY = [
     if name != "csv"
     for k, robot in enumerate(certified_robots(family))
     for seed in (0, 1)
+    if (name, robot) != ("obstacle", "lwr")  # with an elbow only
 ]
 """The defaults of every family on every robot; the normal run has the first of each."""
 
@@ -110,3 +113,16 @@ def test_the_oracle_is_the_motion_that_keeps_clear() -> None:
     for k in range(0, moving, 10):
         target = scenario.reference.placement(k * scenario.dt).homogeneous
         assert np.abs(X[k] - target).max() < 1e-8
+
+
+def test_a_motion_that_is_off_its_path_or_stops_short_is_no_witness() -> None:
+    """By more than rounding: a step whose motion stops short, a graze beside its path."""
+    for selector, moving in (("step[robot=ur5]", False), ("joint-limit-graze", True)):
+        scenario = make_scenario(selector)
+        assert scenario.witness is not None
+        assert scenario.reference.moving == moving
+        motion, embedding = scenario.witness.motion, scenario.embedding
+        assert does_the_task(scenario.robot, motion, scenario.reference, embedding)
+        off = motion.q + 1e-4 * (np.arange(len(motion.q)) == len(motion.q) - 1)[:, None]
+        beside = replace(motion, q=off)
+        assert not does_the_task(scenario.robot, beside, scenario.reference, embedding)
