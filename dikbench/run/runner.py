@@ -96,7 +96,7 @@ def run_study(study: Study, out: Path, settings: RunSettings, command: str) -> R
         run = store.begin_run(manifest(study, len(planned), own), planned)
         if hides := store.hidden() - hidden:
             print(
-                f"rows whose formulation or scenario has changed are kept and not shown: {hides}",
+                f"{hides} rows whose formulation or scenario has changed are kept and not shown",
                 file=sys.stderr,
             )
         done, positions = store.statuses(), {p.id: number for number, p in enumerate(planned)}
