@@ -119,7 +119,8 @@ def _selected(study: str | None, axes: dict[str, Any], out: Path | None) -> tupl
     "--rerun",
     default="",
     metavar="WHICH",
-    help="Run finished trials again: failed, all, or a formulation, scenario or solver.",
+    help="Run finished trials again: failed, outdated (made by other sources or versions), all, or "
+    "a formulation, scenario or solver.",
 )
 @click.option(
     "--trial-timeout",
