@@ -31,6 +31,9 @@ benchmark:       ## how fast the harness is, against its peers (let nothing else
 benchmark-scenarios:  ## how long each scenario takes to build
 	$(PYTHON) tests/benchmarks/scenario_building.py
 
+benchmark-solvers:  ## what each solver answers, and how fast (minutes)
+	$(PYTHON) tests/benchmarks/default_solver.py
+
 # Narrower: make mutation MUTANTS="formulations.sns*"; then `python -m mutmut results`, `... browse`.
 mutation:        ## which changes to the laws and limits no test notices (hours; see pyproject.toml)
 	$(PYTHON) -m pip install --quiet mutmut && $(PYTHON) -m mutmut run $(MUTANTS)
@@ -41,4 +44,4 @@ benchmark-laws:  ## what the laws without a solver cost, as ratios to dls
 constraints:     ## the installed versions become the tested ones
 	.venv/bin/pip freeze --exclude-editable --exclude pip --exclude setuptools > constraints.txt
 
-.PHONY: help setup test test-long lint format contract quick benchmark benchmark-scenarios benchmark-laws mutation constraints
+.PHONY: help setup test test-long lint format contract quick benchmark benchmark-scenarios benchmark-solvers benchmark-laws mutation constraints

@@ -32,8 +32,10 @@ def thin_svd(A: Array) -> tuple[Array, Array, Array]:
 
 def _svd(A: Array, full: int) -> tuple[Array, Array, Array]:
     """Decompose A by LAPACK; NaN where there is no decomposition, as of a matrix with NaN."""
-    U, singular, Vt, failed = dgesdd(A, full_matrices=full)
-    if failed:  # LAPACK leaves zeros behind, which would pass for an answer
+    finite = np.vdot(A, A) < np.inf or np.isfinite(A).all()
+    # Of NaN LAPACK leaves zeros behind, which would pass for an answer; of infinity it never ends.
+    U, singular, Vt, failed = dgesdd(A if finite else np.zeros_like(A), full_matrices=full)
+    if failed or not finite:
         for part in (U, singular, Vt):
             part.fill(np.nan)
     return U, singular, Vt

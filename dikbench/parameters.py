@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from math import inf, isfinite, isnan, nan
 from numbers import Real
-from types import MappingProxyType, NoneType, SimpleNamespace
-from typing import Annotated, Any, Final, Literal, TypeVar
+from types import MappingProxyType, NoneType, SimpleNamespace, UnionType
+from typing import Annotated, Any, Final, Literal, TypeVar, Union
 
 from dikbench.errors import DikbenchError
 
@@ -25,6 +25,16 @@ REQUIRED: Final = dataclasses.MISSING
 """Stands for the default of a parameter that must be given."""
 
 Marker = TypeVar("Marker")
+
+_WORDS: Final[Mapping[Any, str]] = MappingProxyType(
+    {
+        bool: "true or false",
+        float: "a number",
+        int: "a whole number",
+        str: "a text",
+        NoneType: "none",
+    }
+)
 
 
 @dataclass(frozen=True)
@@ -183,12 +193,10 @@ class Parameter:
     def valid(self) -> str:
         """The valid values, in words."""
         if self.range is not None:
-            return str(self.range)
+            return f"{_in_words(self.type)}, {self.range}"
         if self.choices:
             return ", ".join(map(str, self.choices))
-        if self.type is bool:
-            return "true or false"
-        return getattr(self.type, "__name__", str(self.type))
+        return _in_words(self.type)
 
     def check(self, value: Any) -> None:
         """Check a value.
@@ -286,6 +294,12 @@ def _hints(plugin: type, name: str) -> Iterator[Any]:
             yield typing.get_type_hints(alone, names, include_extras=True)[name]
         except (NameError, AttributeError, TypeError, SyntaxError):
             yield None
+
+
+def _in_words(kind: Any) -> str:
+    """Name a type for readers who need not know Python."""
+    parts = typing.get_args(kind) if typing.get_origin(kind) in (Union, UnionType) else (kind,)
+    return " or ".join(_WORDS.get(part, getattr(part, "__name__", str(part))) for part in parts)
 
 
 def _marker(hints: list[Any], kind: type[Marker]) -> Marker | None:

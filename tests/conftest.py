@@ -1,10 +1,11 @@
-"""One thread for linear algebra, as in a worker; bytecode for the many processes; workers."""
+"""One thread for linear algebra; bytecode for the many processes; workers; no limits of time."""
 
 from __future__ import annotations
 
 import os
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(variable, "1")  # before numpy is imported
@@ -12,6 +13,10 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 # Hundreds of processes start; without bytecode each would compile dikbench and Pinocchio again,
 # which takes longer than all else that it does.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+# No test asserts a time: Hypothesis would, and a machine may be busy with something else.
+settings.register_profile("patient", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("patient")
 
 MOST_WORKERS = 4
 """Each takes 0.6 GB."""

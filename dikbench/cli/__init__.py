@@ -15,7 +15,7 @@ from dikbench.cli.checking import check
 from dikbench.cli.one_line_errors import one_line_errors
 from dikbench.cli.reading_commands import compare, replay
 
-SUBJECTS = ("formulations", "scenarios", "solvers", "robots", "metrics", "studies")
+SUBJECTS = ("formulations", "scenarios", "solvers", "plants", "robots", "metrics", "studies")
 
 
 def main() -> None:
@@ -119,7 +119,8 @@ def _selected(study: str | None, axes: dict[str, Any], out: Path | None) -> tupl
     "--rerun",
     default="",
     metavar="WHICH",
-    help="Run finished trials again: failed, all, or a formulation, scenario or solver.",
+    help="Run finished trials again: failed, outdated (made by other sources or versions), all, or "
+    "a formulation, scenario or solver.",
 )
 @click.option(
     "--trial-timeout",
@@ -270,9 +271,9 @@ def list_(subject: str | None) -> None:
 )
 @one_line_errors
 def show(name: str, figure: Path | None) -> None:
-    """Print one formulation, scenario, solver, robot, metric or study in full.
+    """Print one formulation, scenario, solver, plant, robot, metric or study in full.
 
-    A scenario's selector prints its certificate as well.
+    Parameters may stand in brackets. A scenario's selector prints its certificate as well.
     """
     from dikbench.cli.listing import description
 

@@ -99,7 +99,8 @@ def _of_plugin(name: str, solver: str | None) -> Iterator[Line]:
     known |= dict.fromkeys(plugins("formulation"), "formulation")
     known |= dict.fromkeys(plugins("scenario"), "scenario")
     if plugin not in known:
-        raise unknown("formulation or scenario", plugin, known, "(or give path/to/file.py:Class)")
+        where = "(or give path/to/file.py:Class)"
+        raise unknown("formulation or scenario", plugin, known, where, "dikbench list")
     if known[plugin] == "formulation":
         verdicts = verdicts_on_formulation(make_formulation(name), solver)
     elif solver is not None:

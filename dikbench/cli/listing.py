@@ -10,9 +10,9 @@ from typing import Final
 
 import numpy as np
 
-from dikbench.errors import unknown
+from dikbench.errors import DikbenchError, unknown
 from dikbench.metrics import METRICS, Metric
-from dikbench.plugins.building import make_scenario
+from dikbench.plugins.building import make_formulation, make_plant, make_scenario
 from dikbench.plugins.finding import (
     Plugin,
     formulation_plugin,
@@ -24,9 +24,15 @@ from dikbench.plugins.finding import (
 from dikbench.report.tables.kinds import kinds_with
 from dikbench.robots.catalogue import ROBOTS, load_robot
 from dikbench.scenario.oracle import ORACLE, ORACLES, SLOWED_ORACLE
+from dikbench.scenario.plant import PLANTS
 from dikbench.scenario.scenario import Scenario
-from dikbench.selector import parse_selector
-from dikbench.solvers.catalogue.back_ends import BACK_ENDS, DEFAULT_SOLVER, is_installed
+from dikbench.selector import Selector, listed, parse_selector
+from dikbench.solvers.catalogue.back_ends import (
+    BACK_ENDS,
+    DEFAULT_SOLVER,
+    is_installed,
+    parse_solver,
+)
 from dikbench.solvers.catalogue.presets import TOLERANCES
 from dikbench.study.study import load_study, shipped_studies
 
@@ -94,6 +100,7 @@ _SUBJECTS: Mapping[str, Callable[[], list[tuple[str, str, str]]]] = {
     "formulations": _formulations,
     "scenarios": _scenarios,
     "solvers": _solvers,
+    "plants": lambda: [(name, _plant(name).summary.rstrip("."), "") for name in PLANTS],
     "robots": lambda: [(name, entry.summary, "") for name, entry in ROBOTS.items()],
     "metrics": _metrics,
     "studies": lambda: [(n, load_study(n).description, "") for n in shipped_studies()],
@@ -108,15 +115,30 @@ def description(text: str) -> str:
     """
     selector = parse_selector(text)
     name = selector.name
-    if name in ORACLES:
-        return f"{name}: {ORACLE_SUMMARIES[name]}"
     kind = kind_in_file(name) if in_file(name) else None
     if kind == "formulation" or name in plugins("formulation"):
-        return _plugin(formulation_plugin(name), "tuned")
+        make_formulation(selector)
+        return _plugin(formulation_plugin(name), selector, "tuned")
     if kind == "scenario" or name in plugins("scenario"):
-        return "\n".join([_plugin(scenario_plugin(name), "instances"), "", *_difficulty(text)])
+        difficulty = _difficulty(text)
+        return "\n".join([_plugin(scenario_plugin(name), selector, "instances"), "", *difficulty])
     if name in BACK_ENDS:
-        return _solver(name)
+        return _solver(selector)
+    if name in PLANTS:
+        make_plant(selector)
+        return _plugin(_plant(name), selector, "")
+    described = _without_parameters(name)
+    if selector.parameters:
+        raise DikbenchError(
+            f"{text}: {name} has no parameters; valid in brackets: those of a formulation, "
+            "scenario, solver or plant"
+        )
+    return described
+
+
+def _without_parameters(name: str) -> str:
+    if name in ORACLES:
+        return f"{name}: {ORACLE_SUMMARIES[name]}"
     if name in ROBOTS:
         return _robot(name)
     if name in METRICS:
@@ -125,15 +147,33 @@ def description(text: str) -> str:
         study = load_study(name)
         path = shipped_studies().get(name, name)
         return f"# {study.name} ({path})\n\n{Path(path).read_text(encoding='utf-8')}"
-    every = [*plugins("formulation"), *plugins("scenario"), *BACK_ENDS, *ROBOTS, *METRICS]
-    raise unknown("name", name, [*every, *shipped_studies()])
+    every = [*plugins("formulation"), *plugins("scenario"), *BACK_ENDS, *PLANTS, *ROBOTS, *METRICS]
+    raise unknown("name", name, [*every, *shipped_studies()], every="dikbench list")
 
 
-def _plugin(plugin: Plugin, drawn: str) -> str:
-    """Describe a plug-in by its docstring and parameters; `drawn` says what ranges are for."""
+def _plant(name: str) -> Plugin:
+    return Plugin(name, PLANTS[name], inspect.getsourcefile(PLANTS[name]) or "")
+
+
+def _plugin(plugin: Plugin, selector: Selector, drawn: str) -> str:
+    """Describe a plug-in by its docstring and parameters.
+
+    Args:
+        plugin: what is described.
+        selector: as it was named, with its values.
+        drawn: what the ranges are for in which parameters are drawn.
+    """
+    given = selector.parameters
+    values = {
+        p.name: f" = {given[p.name]} (default: {'none' if p.required else p.default})"
+        if p.name in given
+        else ""
+        if p.required
+        else f" = {p.default}"
+        for p in plugin.parameters.values()
+    }
     parameters = [
-        f"  {p.name}{'' if p.required else f' = {p.default}'}: {p.valid}"
-        + (f"  ({drawn}: {p.drawn})" if p.drawn else "")
+        f"  {p.name}{values[p.name]}: {p.valid}" + (f"  ({drawn}: {p.drawn})" if p.drawn else "")
         for p in plugin.parameters.values()
         if not p.hidden
     ]
@@ -192,8 +232,10 @@ def _verdict(scenario: Scenario) -> list[str]:
     ]
 
 
-def _solver(name: str) -> str:
-    entry = BACK_ENDS[name]
+def _solver(selector: Selector) -> str:
+    name, entry = selector.name, BACK_ENDS[selector.name]
+    if selector.parameters:
+        parse_solver(selector)
     presets = ", ".join(f"{preset} {tolerance:g}" for preset, tolerance in TOLERANCES.items())
     settings = ", ".join(f"{key} ({kind.__name__})" for key, kind in entry.settings.items())
     return "\n".join(
@@ -210,6 +252,7 @@ def _solver(name: str) -> str:
                 for program, default in DEFAULT_SOLVER.items()
                 if parse_selector(default).name == name
             ),
+            *([f"  selected: {listed(selector.parameters)}"] if selector.parameters else []),
         ]
     )
 

@@ -8,31 +8,74 @@ from pathlib import Path
 import click
 
 from dikbench.cli.one_line_errors import one_line_errors
+from dikbench.errors import DikbenchError
+
+MOST_FORMULATIONS = 2
+"""One is compared with all others, two with one another."""
 
 
 @click.command()
-@click.argument("a", type=click.Path(path_type=Path, file_okay=False))
-@click.argument("b", type=click.Path(path_type=Path, file_okay=False))
+@click.argument("a", metavar="A", type=click.Path(path_type=Path, file_okay=False))
+@click.argument(
+    "b", metavar="[B]", required=False, type=click.Path(path_type=Path, file_okay=False)
+)
 @click.option(
     "--tolerance",
     "tolerances",
     multiple=True,
     metavar="METRIC=VALUE",
     help="How much worse a metric may become in any trial, in its unit or in percent of its value "
-    "in A ('position_error_rms_m=5%'); repeat. A trial that newly fails exceeds it as well.",
+    "in A ('position_error_rms_m=5%'); how much the rate of success of a formulation may fall "
+    "('success=2%', else 0); how much longer it may take ('formulation_time_median_us=20%'); "
+    "repeat. Trials that are missing or newly fail exceed it as well, and those whose solver does.",
+)
+@click.option(
+    "--formulation",
+    "formulations",
+    multiple=True,
+    metavar="NAME",
+    help="Compare formulations within A: this one with a second one, or with all others; "
+    "'qp with daqp' where it ran with several solvers.",
+)
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["text", "markdown", "csv", "latex"]),
+    help="How a comparison of formulations is written; default: text.",
 )
 @click.option(
     "--out",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE",
-    help="Write every row: the text (.md), or each difference of each trial (.csv).",
+    help="Write every row: the text (.md), or each difference of each trial (.csv); of "
+    "formulations what is printed.",
 )
 @one_line_errors
-def compare(a: Path, b: Path, tolerances: tuple[str, ...], out: Path | None) -> None:
-    """Compare two results folders, B with A, regressions first.
+def compare(
+    a: Path,
+    b: Path | None,
+    tolerances: tuple[str, ...],
+    formulations: tuple[str, ...],
+    form: str | None,
+    out: Path | None,
+) -> None:
+    """Compare two results folders, B with A, or formulations within one.
 
-    The exit code is 1 where a tolerance is exceeded, 2 where the folders cannot be compared.
+    The first line says whether B passes. The exit code is 1 where a tolerance is exceeded, 2 where
+    there is nothing to compare.
     """
+    if formulations:
+        if b is not None or tolerances or len(formulations) > MOST_FORMULATIONS:
+            raise DikbenchError(
+                "--formulation compares one or two formulations within one results folder, "
+                "without --tolerance"
+            )
+        _compare_formulations(a, formulations, form or "text", out)
+        return
+    if b is None or form is not None:
+        raise DikbenchError(
+            "compare takes two results folders, or one and --formulation (which --format is for)"
+        )
     from dikbench.report.comparison.comparison import compare as compare_folders
     from dikbench.report.comparison.rendering import render, write
     from dikbench.report.comparison.tolerances import parse_tolerance
@@ -42,6 +85,25 @@ def compare(a: Path, b: Path, tolerances: tuple[str, ...], out: Path | None) -> 
         write(found, out)
     click.echo(render(found))
     sys.exit(1 if found.regressed else 0)
+
+
+def _compare_formulations(
+    folder: Path, formulations: tuple[str, ...], form: str, out: Path | None
+) -> None:
+    """Print how a formulation does against others, and write it to a file."""
+    from dikbench.report.comparison.formulation_tables import FORMATS
+    from dikbench.report.comparison.formulations import compare_formulations
+    from dikbench.report.selection.judged import judged_plant
+    from dikbench.results.reading import read_results, without_attributes
+
+    trials = without_attributes(read_results(folder)).trials
+    text = FORMATS[form](compare_formulations(trials, formulations), judged_plant(trials))
+    if out is not None:
+        try:
+            out.write_text(text + "\n", encoding="utf-8")
+        except OSError as error:
+            raise DikbenchError(f"file {out}: {error.strerror or error}") from None
+    click.echo(text)
 
 
 @click.command()

@@ -67,8 +67,8 @@ def run_study(
         trial_timeout: wall-clock limit of a trial [s].
         trial_memory: memory of a trial [MB].
         traces: which trials keep their control steps: all, failures or none.
-        rerun: finished trials that are run again: failed, all, or the name or selector of a
-            formulation, scenario or solver.
+        rerun: finished trials that are run again: failed, outdated (made by other sources or
+            versions), all, or the name or selector of a formulation, scenario or solver.
         report: whether tables, figures and the report are written.
 
     Raises:

@@ -147,13 +147,11 @@ class Judgement:
         """Make the judgement of a row of results, without the steps that decided."""
         before, chatters = row["decided_before"], bool(row["chatters"])
         return cls(
-            before=Verdict(Outcome(before)) if before else None,
+            before=Verdict(Outcome(before)) if isinstance(before, str) and before else None,
             by_clock=row["reference"] == "time",
             has_path=bool(row["judged_by_path"]),
             feasible=row["feasible"],
-            off_path=Verdict(
-                Outcome.LEFT_PATH, -1, row["contour_error_6d_max_m"], row["off_path_by"]
-            ),
+            off_path=Verdict(Outcome.LEFT_PATH, -1, row["contour_error_6d_max_m"]),
             end=Verdict(Outcome.UNFINISHED, -1, row["tracking_error_6d_final_m"]),
             done_99=row["path_done_99_tolerance_m"],
             done_90=row["path_done_90_tolerance_m"],

@@ -8,7 +8,7 @@ from typing import Any, Literal, TypeVar
 
 import msgspec
 
-from dikbench.errors import DikbenchError, unknown
+from dikbench.errors import DikbenchError, in_words, unknown
 from dikbench.parameters import Parameter, check_parameters, parameters_of
 from dikbench.plugins.finding import formulation_plugin, scenario_plugin
 from dikbench.problem.problem import Formulation
@@ -141,14 +141,13 @@ def _values(what: str, parameters: Mapping[str, Parameter], selector: Selector) 
             raise unknown(f"parameter of {what}", name, offered)
         try:
             values[name] = msgspec.convert(text, parameter.type, strict=False)
-        except (msgspec.ValidationError, TypeError) as error:  # a TypeError: no text converts to it
-            why = f"; valid: {parameter.valid}" if parameter.choices else f": {error}"
-            raise DikbenchError(f"{what}: {name}={text!r} is not valid{why}") from None
+        except (msgspec.ValidationError, TypeError):  # a TypeError: no text converts to it
+            raise DikbenchError(
+                f"{what}: {name}={text!r} is not valid; valid: {parameter.valid}"
+            ) from None
     return values
 
 
 def _reason(error: Exception) -> str:
-    """Write an error in one line, with its type unless it is a `DikbenchError`."""
-    if isinstance(error, DikbenchError):
-        return str(error)
-    return f"{type(error).__name__}: {error}".partition("\n")[0]
+    """Write an error in one line, with type and place unless it is a `DikbenchError`."""
+    return str(error) if isinstance(error, DikbenchError) else in_words(error)

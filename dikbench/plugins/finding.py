@@ -19,7 +19,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal
 
-from dikbench.errors import DikbenchError, unknown
+from dikbench.errors import DikbenchError, in_words, unknown
 from dikbench.parameters import Parameter, parameters_of
 from dikbench.scenario.family import Family
 
@@ -82,7 +82,7 @@ def plugins(kind: Kind) -> Mapping[str, Plugin]:
             module = entry_point.load()
         except Exception as error:
             raise DikbenchError(
-                f"{where} ({entry_point.value}) cannot be imported: {type(error).__name__}: {error}"
+                f"{where} ({entry_point.value}) cannot be imported: {in_words(error)}"
             ) from error
         file = getattr(module, "__file__", None) or repr(module)
         table = getattr(module, f"{kind.upper()}S", None)
@@ -113,24 +113,45 @@ def scenario_plugin(name: str) -> Plugin:
 
 
 def in_file(name: str) -> bool:
-    """Say whether a selector's name has the form `path/to/file.py:Class`."""
-    return name.rpartition(":")[0].endswith(".py")
+    """Say whether a selector's name has the form `path/to/file.py:Class`, or lacks the class."""
+    return name.rpartition(":")[0].endswith(".py") or name.endswith(".py")
+
+
+def _file_and_class(name: str) -> tuple[str, str]:
+    """Split `path/to/file.py:Class`.
+
+    Raises:
+        DikbenchError: if there is no class; the message names those of the file.
+    """
+    if not name.endswith(".py"):
+        path, _, class_name = name.rpartition(":")
+        return path, class_name
+    own = [
+        value
+        for value in _own_classes(_module_from_file(name))
+        if issubclass(value, Family) or callable(getattr(value, "velocity", None))
+    ]
+    valid = ", ".join(f"{name}:{value.__name__}" for value in own)
+    raise DikbenchError(
+        f"{name} names a file without a class; valid: "
+        f"{valid or 'none, for it holds no formulation and no family'}"
+    )
 
 
 def kind_in_file(name: str) -> Kind:
     """Say whether a class in a user's file is a formulation or a family."""
-    path, _, class_name = name.rpartition(":")
-    found = _class_from_file("formulation", path, class_name)
+    found = _class_from_file(*_file_and_class(name))
     return "scenario" if issubclass(found, Family) else "formulation"
 
 
 def _plugin(kind: Kind, name: str) -> Plugin:
     if in_file(name):
-        path, _, class_name = name.rpartition(":")
-        return _registered(kind, class_name, _class_from_file(kind, path, class_name), path)
+        path, class_name = _file_and_class(name)
+        return _registered(kind, class_name, _class_from_file(path, class_name), path)
     known = plugins(kind)
     if name not in known:
-        raise unknown(kind, name, known, "(or give path/to/file.py:Class)")
+        where = "(or give path/to/file.py:Class)"
+        raise unknown(kind, name, known, where, f"dikbench list {kind}s")
     return known[name]
 
 
@@ -151,6 +172,10 @@ def _registered(kind: Kind, name: object, entry: Any, file: str) -> Plugin:
         raise DikbenchError(f"{where} has no method velocity(problem, solve)")
     if kind == "scenario" and not issubclass(factory, Family):
         raise DikbenchError(f"{where} is not derived from dikbench.scenario.Family")
+    if kind == "scenario" and inspect.isabstract(factory):
+        raise DikbenchError(f"{where} has no method case(robot, change)")
+    if not is_dataclass(factory):
+        raise DikbenchError(f"{where}: write @dataclass(frozen=True) above class {name}")
     try:
         parameters = parameters_of(factory)
     except DikbenchError as error:
@@ -164,22 +189,26 @@ def _registered(kind: Kind, name: object, entry: Any, file: str) -> Plugin:
     return Plugin(name, factory, file, defaults)
 
 
-def _class_from_file(kind: Kind, path: str, class_name: str) -> type:
+def _class_from_file(path: str, class_name: str) -> type:
     """Import a class from a file that the user named."""
-    module = _module_from_file(kind, path)
+    module = _module_from_file(path)
     found = getattr(module, class_name, None)
     if not isinstance(found, type):
-        own = [value for value in vars(module).values() if isinstance(value, type)]
-        classes = [value.__name__ for value in own if value.__module__ == module.__name__]
+        classes = [value.__name__ for value in _own_classes(module)]
         raise unknown("class", class_name, classes, f"in {path}")
     return found
 
 
+def _own_classes(module: ModuleType) -> list[type]:
+    own = [value for value in vars(module).values() if isinstance(value, type)]
+    return [value for value in own if value.__module__ == module.__name__]
+
+
 @lru_cache
-def _module_from_file(kind: Kind, path: str) -> ModuleType:
+def _module_from_file(path: str) -> ModuleType:
     file = Path(path)
     if not os.path.isfile(path):  # unlike Path.is_file, False for a name that is too long
-        raise DikbenchError(f"{kind} file not found: {path}")
+        raise DikbenchError(f"file not found: {path}; valid: path/to/file.py:Class")
     spec = importlib.util.spec_from_file_location(f"dikbench_user_{file.stem}", file)
     assert spec is not None
     assert spec.loader is not None
@@ -188,7 +217,8 @@ def _module_from_file(kind: Kind, path: str) -> ModuleType:
     try:
         spec.loader.exec_module(module)
     except Exception as error:
-        raise DikbenchError(
-            f"{kind} file {path} cannot be imported: {type(error).__name__}: {error}"
-        ) from error
+        slip = "non-frozen dataclass from a frozen" in str(error)
+        hint = "; valid: @dataclass(frozen=True) above the class" if slip else ""
+        said = str(error) if isinstance(error, DikbenchError) else in_words(error) + hint
+        raise DikbenchError(f"{path} cannot be imported: {said}") from error
     return module

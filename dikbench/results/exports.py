@@ -50,7 +50,7 @@ def read_trials(folder: Path, notes: list[str]) -> pd.DataFrame:
     for name in trials.columns:
         if name not in TEXT:
             trials[name] = _numbers(trials[name])
-        elif name != "message":
+        elif name not in ("message", *OUTCOME_TEXTS):
             trials[name] = trials[name].replace("", None)
     return trials
 

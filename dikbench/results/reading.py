@@ -163,23 +163,36 @@ def _stored_or_exported(
         try:
             with folder.open_store() as store:
                 trials, manifest = store.trials(), store.manifest()
-                versions = sorted({_version(made) for made in store.environments()})
         except DikbenchError as error:
             if not are_exported(folder.path) or not (lenient or isinstance(error, OtherVersion)):
                 raise
             if lenient:
                 notes.append(f"Read from trials.csv, for the store cannot be read: {error}.")
         else:
-            if lenient and len(versions) > 1:
-                notes.append(f"Rows were made by different versions: {', '.join(versions)}.")
-            return trials, manifest, notes
+            return trials, manifest, [*notes, *(_several_versions(manifest) if lenient else ())]
     trials = read_trials(folder.path, notes)
     if not lenient:
         return trials, read_manifest(folder.path), notes
-    environments = trials["environment"].nunique() if "environment" in trials else 0
-    if environments > 1:
-        notes.append(f"Rows were made in {environments} different environments.")
-    return trials, _manifest(folder.path, notes), notes
+    manifest = _manifest(folder.path, notes)
+    return trials, manifest, [*notes, *_several_versions(manifest)]
+
+
+def _several_versions(manifest: dict[str, Any]) -> list[str]:
+    """Say which versions made the rows, where several did."""
+    described = manifest.get("environments", {}).values()
+    versions = {_version(made) for made in described}
+    for kind in ("libraries", "solvers"):
+        for name, together in manifest.get(kind, {}).items():
+            if name != "dikbench" and ", " in str(together):
+                versions.add(f"{name} {together}")
+    dikbench = sum(text.startswith("dikbench ") for text in versions)
+    if len(versions) == dikbench <= 1:
+        return []
+    told = sorted(text for text in versions if dikbench > 1 or not text.startswith("dikbench "))
+    return [
+        f"Rows were made by different versions: {'; '.join(told)}. `--rerun outdated` runs again "
+        "what this one did not make."
+    ]
 
 
 def _version(environment: dict[str, Any]) -> str:

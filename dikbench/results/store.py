@@ -9,60 +9,19 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Self
+from typing import Any, Self
 
 import pandas as pd
 
 from dikbench.errors import DikbenchError
-from dikbench.metrics import METRICS, OUTCOME_NUMBERS, OUTCOME_TEXTS
-from dikbench.results.columns import (
-    KEYS,
-    REDEFINED,
-    RENAMED_METRICS,
-    RENAMED_TIMES,
-    SEES,
-    TIMED,
-    TIMES,
-    TRIAL,
-)
+from dikbench.metrics import OUTCOME_TEXTS
+from dikbench.results.columns import KEYS, RENAMED_METRICS, TIMED, TIMES, TRIAL
+from dikbench.results.schema import EMPTY_TEXT, NUMBERS, SCHEMA_VERSION, TABLES, migrate
+from dikbench.results.versions import is_outdated, versions_of_rows
 from dikbench.scenario.oracle import ORACLES
-from dikbench.study.identity import timing_id
+from dikbench.study.identity import timing_id, timing_id_today, trial_id_today
 from dikbench.study.plan import PlannedTrial
 from dikbench.study.trial import Trial
-
-SCHEMA_VERSION: Final = 3
-"""Version of the tables below. Stores of versions 1 and 2 are brought to it when they are opened;
-other versions are refused."""
-
-NUMBERS: Final = (*METRICS, *OUTCOME_NUMBERS, *SEES, "wall_time_s", "control_time_s")
-
-TABLES: Final = f"""
-CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL);
-CREATE TABLE runs (id INTEGER PRIMARY KEY, manifest TEXT NOT NULL);
-CREATE TABLE environments (id TEXT PRIMARY KEY, description TEXT NOT NULL);
-CREATE TABLE trials (
-  id TEXT PRIMARY KEY,
-  formulation TEXT NOT NULL, solver TEXT NOT NULL, scenario TEXT NOT NULL,
-  plant TEXT NOT NULL, reference TEXT NOT NULL, seed INTEGER NOT NULL,
-  status TEXT NOT NULL, message TEXT NOT NULL, steps INTEGER NOT NULL,
-  {", ".join(f"{name} TEXT" for name in OUTCOME_TEXTS)},
-  {", ".join(f"{name} REAL" for name in NUMBERS)},
-  environment TEXT REFERENCES environments (id),
-  run INTEGER NOT NULL REFERENCES runs (id),
-  position INTEGER, superseded INTEGER NOT NULL DEFAULT 0
-);
-CREATE TABLE times (
-  id TEXT NOT NULL,
-  formulation TEXT NOT NULL, solver TEXT NOT NULL, scenario TEXT NOT NULL,
-  {", ".join(f"{name} {kind}" for name, (kind, _) in TIMES.items())},
-  environment TEXT REFERENCES environments (id),
-  run INTEGER NOT NULL REFERENCES runs (id),
-  PRIMARY KEY (formulation, solver, scenario)
-);
-"""
-"""A trial's `position` is its place in the plan of the last run; without one it is not part of the
-plan and shown last. It is `superseded`, kept but not shown, where the plan has a trial with the
-same selectors whose formulation or scenario has another source."""
 
 
 class OtherVersion(DikbenchError):
@@ -155,13 +114,29 @@ class Store:
             "UPDATE OR REPLACE times SET formulation = ?, solver = ?, scenario = ? WHERE id = ?",
             [(*selectors, name) for selectors, name in timed.items()],
         )
-        rows = self._database.execute(
-            f"SELECT id, {', '.join(TRIAL)} FROM trials WHERE position IS NULL AND NOT superseded"
-        )
-        known = {tuple(row[1:]): row[0] for row in rows}
-        now = (tuple(p.trial.row.values()) for p in planned)
-        old = [(known[selectors],) for selectors in now if selectors in known]
-        self._database.executemany("UPDATE trials SET superseded = 1 WHERE id = ?", old)
+        self._supersede({tuple(p.trial.row.values()) for p in planned})
+
+    def _supersede(self, planned: set[tuple[str | int, ...]]) -> None:
+        """Hide the rows whose sources are not those of today, and show those whose sources are.
+
+        Args:
+            planned: the cells of the plan; rows of theirs outside of it have other sources.
+        """
+        rows = self._rows(f"SELECT id, {', '.join(TRIAL)} FROM trials WHERE position IS NULL")
+        hidden = []
+        for name, *cell in rows:
+            today = trial_id_today(dict(zip(TRIAL, cell, strict=True)))
+            if tuple(cell) in planned or today is not None:
+                hidden.append((int(today != name), name))
+        self._database.executemany("UPDATE trials SET superseded = ? WHERE id = ?", hidden)
+        rows = self._rows(f"SELECT id, {', '.join(TIMED)} FROM times")
+        of_times = [
+            (int(today != name), *cell)
+            for name, *cell in rows
+            if (today := timing_id_today(*cell)) is not None
+        ]
+        where = " AND ".join(f"{name} = ?" for name in TIMED)
+        self._database.executemany(f"UPDATE times SET superseded = ? WHERE {where}", of_times)
 
     def statuses(self) -> dict[str, str]:
         """Return the status of every trial that has a row, by id."""
@@ -177,9 +152,29 @@ class Store:
             for name, steps, status, *cell in rows
         ]
 
+    def hidden(self) -> int:
+        """Count the trials that are kept and not shown, since their sources have changed."""
+        return int(self._rows("SELECT COUNT(*) FROM trials WHERE superseded")[0][0])
+
     def timed(self) -> set[str]:
         """Return the ids of the cells that have times."""
         return {row[0] for row in self._rows("SELECT id FROM times")}
+
+    def outdated(self, now: Mapping[str, Any]) -> set[str]:
+        """Return the ids of trials and cells of times that other versions than these made.
+
+        Args:
+            now: the description of this process (see `is_outdated`).
+        """
+        return {
+            name
+            for table in ("trials", "times")
+            for name, solver, made in self._rows(
+                f"SELECT {table}.id, solver, description FROM {table} "
+                f"LEFT JOIN environments ON environments.id = {table}.environment"
+            )
+            if is_outdated(solver, None if made is None else json.loads(made), now)
+        }
 
     def environment(self, description: Mapping[str, Any]) -> str:
         """Store the description of a process, each once.
@@ -197,7 +192,7 @@ class Store:
     def record_trial(self, row: Mapping[str, Any], run: int, position: int) -> None:
         """Commit the row of a finished trial, replacing an earlier one."""
         columns = ("id", *KEYS, "steps", *OUTCOME_TEXTS, *NUMBERS, "environment")
-        values = {name: row.get(name) for name in columns}
+        values = {name: row.get(name, "" if name in OUTCOME_TEXTS else None) for name in columns}
         self._insert("trials", {**values, "run": run, "position": position})
 
     def record_metrics(self, trial: str, metrics: Mapping[str, Any]) -> None:
@@ -226,17 +221,29 @@ class Store:
         return trials.merge(self.times(), on=TIMED, how="left")
 
     def times(self) -> pd.DataFrame:
-        """Return the times of every cell."""
+        """Return the times of every cell whose sources have not changed."""
         numbers = [name for name, (kind, _) in TIMES.items() if kind == "REAL"]
         columns = ", ".join([*TIMED, *TIMES])
-        return self._frame(f"SELECT {columns} FROM times ORDER BY {', '.join(TIMED)}", numbers)
+        return self._frame(
+            f"SELECT {columns} FROM times WHERE NOT superseded ORDER BY {', '.join(TIMED)}", numbers
+        )
 
     def manifest(self) -> dict[str, Any]:
-        """Return the description of the last run.
+        """Return the description of the last run, with the versions that made the rows.
 
         Raises:
             DikbenchError: if there was none.
         """
+        made = self._rows(
+            "SELECT solver, environment, description FROM trials "
+            "JOIN environments ON environments.id = environment "
+            "WHERE NOT superseded GROUP BY solver, environment ORDER BY MIN(run), environment"
+        )
+        return versions_of_rows(
+            self._last_run(), [(solver, name, json.loads(text)) for solver, name, text in made]
+        )
+
+    def _last_run(self) -> dict[str, Any]:
         rows = self._rows("SELECT manifest FROM runs ORDER BY id DESC LIMIT 1")
         if not rows:
             raise DikbenchError(f"store {self.path}: it holds no run")
@@ -245,19 +252,11 @@ class Store:
 
     def note(self, key: str, value: Any) -> None:
         """Add an entry to the description of the last run."""
-        noted = json.dumps({**self.manifest(), key: value})
+        noted = json.dumps({**self._last_run(), key: value})
         with self._guarded():
             self._database.execute(
                 "UPDATE runs SET manifest = ? WHERE id = (SELECT MAX(id) FROM runs)", [noted]
             )
-
-    def environments(self) -> list[dict[str, Any]]:
-        """Return the descriptions of the processes that made the rows that are shown."""
-        rows = self._rows(
-            "SELECT description FROM environments WHERE id IN "
-            "(SELECT environment FROM trials WHERE NOT superseded)"
-        )
-        return [json.loads(row[0]) for row in rows]
 
     def close_neatly(self) -> None:
         """Fold the write-ahead log into the file."""
@@ -318,7 +317,7 @@ class Store:
             columns = [row[1] for row in self._database.execute("PRAGMA table_info(trials)")]
         except sqlite3.DatabaseError as error:
             raise DikbenchError(f"store {self.path}: not a store of dikbench: {error}") from None
-        if found.get("schema") not in ("1", "2", str(SCHEMA_VERSION)):
+        if found.get("schema") not in [str(known) for known in range(1, SCHEMA_VERSION + 1)]:
             raise OtherVersion(
                 f"store {self.path}: schema version {found.get('schema')!r} is not known; this "
                 f"dikbench reads versions 1 to {SCHEMA_VERSION}"
@@ -331,29 +330,11 @@ class Store:
                 f"{min(missing)!r}); choose another folder, or add them with `dikbench recompute`"
             )
         if found["schema"] != str(SCHEMA_VERSION):
-            self._migrate(columns, times=found["schema"] == "1")
+            with self._guarded(), self._transaction():
+                migrate(self._database, found["schema"], columns)
         for name in missing:
-            kind = "TEXT" if name in OUTCOME_TEXTS else "REAL"
+            kind = EMPTY_TEXT if name in OUTCOME_TEXTS else "REAL"
             self._database.execute(f"ALTER TABLE trials ADD COLUMN {name} {kind}")
-
-    def _migrate(self, columns: Sequence[str], *, times: bool) -> None:
-        """Bring the tables of an earlier version, with these columns of trials, to today's.
-
-        Metrics and, of version 1, times are renamed; values of metrics that have another definition
-        today are deleted, to be recomputed.
-        """
-        renamed = {old: new for old, new in RENAMED_METRICS.items() if old in columns}
-        with self._guarded(), self._transaction():
-            for old, new in renamed.items():
-                self._database.execute(f"ALTER TABLE trials RENAME COLUMN {old} TO {new}")
-            for name in REDEFINED:
-                if name in columns:
-                    self._database.execute(f"UPDATE trials SET {name} = NULL")
-            for old, new in RENAMED_TIMES.items() if times else ():
-                self._database.execute(f"ALTER TABLE times RENAME COLUMN {old} TO {new}")
-            self._database.execute(
-                "UPDATE meta SET value = ? WHERE key = 'schema'", [str(SCHEMA_VERSION)]
-            )
 
     def _check_untouched(self) -> None:
         """Check that the file is still there: SQLite would write to a removed one in silence."""

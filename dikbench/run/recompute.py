@@ -24,7 +24,7 @@ from dikbench.run.worker_process import restore_process
 from dikbench.scenario.scenario import Scenario
 from dikbench.simulation.status import Status
 from dikbench.simulation.trace import Trace
-from dikbench.study.identity import trial_id
+from dikbench.study.identity import trial_id_today
 
 STATUSES: Final = MappingProxyType({status.value: status for status in Status})
 """Statuses by their names."""
@@ -81,7 +81,7 @@ def recompute_results(out: Path, jobs: int, command: str) -> Recomputed:
             raise DikbenchError(
                 f"no traces in {folder.traces}: they were not kept (`--traces none`), or removed"
             )
-        todo = [stored for stored in traced if _is_the_same(stored)]
+        todo = [stored for stored in traced if trial_id_today(stored.trial.row) == stored.id]
         try:
             failed = _recompute(store, folder, todo, jobs)
         except KeyboardInterrupt:
@@ -94,14 +94,6 @@ def recompute_results(out: Path, jobs: int, command: str) -> Recomputed:
         store.close_neatly()
     done = len(todo) - len(failed)
     return Recomputed(done, len(moved) - len(traced), len(traced) - len(todo), failed)
-
-
-def _is_the_same(stored: StoredTrial) -> bool:
-    """Say whether a trial would have the same id if it were run today."""
-    try:
-        return trial_id(stored.trial) == stored.id
-    except DikbenchError:  # the formulation's file is gone, the scenario has another parameter
-        return False
 
 
 def _recompute(

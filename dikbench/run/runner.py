@@ -17,7 +17,7 @@ from pebble import ProcessExpired
 from dikbench.errors import DikbenchError, unknown
 from dikbench.results.folder import ResultsFolder
 from dikbench.results.store import Store
-from dikbench.run.pool import end_group, workers
+from dikbench.run.pool import THREAD_VARIABLES, end_group, workers
 from dikbench.run.progress_display import ProgressDisplay
 from dikbench.run.provenance import environment, git_commit, manifest
 from dikbench.run.timing import Contender, time_scenario
@@ -38,6 +38,10 @@ FATAL_STATUSES: Final = frozenset(
 )
 """Statuses of a trial after which its formulation is not timed."""
 
+OUTDATED: Final = "outdated"
+RERUNS: Final = ("failed", OUTDATED, "all")
+"""What may be run again, in addition to a formulation, scenario or solver."""
+
 TRIALS_HANDED_AHEAD_PER_WORKER: Final = 8
 """So many that no worker waits, and few enough that memory does not grow."""
 
@@ -55,8 +59,8 @@ class RunSettings:
         trial_timeout: wall-clock limit of a trial [s], enforced from outside its process.
         trial_memory: memory of a trial beyond that of its process at the start [MB].
         traces: which traces are kept.
-        rerun: which finished trials are run again: "", "failed", "all", or the selector (or the
-            name) of a formulation, scenario or solver.
+        rerun: which finished trials are run again: "", "failed", "outdated" (made by other sources
+            or versions), "all", or the selector (or the name) of a formulation, scenario or solver.
     """
 
     jobs: int
@@ -86,20 +90,33 @@ def run_study(study: Study, out: Path, settings: RunSettings, command: str) -> R
     with folder.lock(), Store(folder.database) as store:
         commit = git_commit()
         own = environment(commit, command)
+        # What a worker of this run would say of itself, for rows of workers that died.
+        worker = own | {"threads": dict.fromkeys(THREAD_VARIABLES, "1")}
+        hidden = store.hidden()
         run = store.begin_run(manifest(study, len(planned), own), planned)
+        if hides := store.hidden() - hidden:
+            print(
+                f"{hides} rows whose formulation or scenario has changed are kept and not shown",
+                file=sys.stderr,
+            )
         done, positions = store.statuses(), {p.id: number for number, p in enumerate(planned)}
-        todo = [p for p in planned if p.id not in done or _again(p, done[p.id], settings.rerun)]
+        outdated = store.outdated(own) if settings.rerun == OUTDATED else set()
+        todo = [
+            p
+            for p in planned
+            if p.id not in done or p.id in outdated or _again(p, done[p.id], settings.rerun)
+        ]
         if len(todo) < len(planned):
             print(f"{len(planned) - len(todo)} of {len(planned)} trials are done", file=sys.stderr)
         try:
             with ProgressDisplay(len(todo), "trials") as display:
                 for trial, row in run_trials(todo, folder, settings, commit, command):
-                    described = row.pop("described", None)
-                    row["environment"] = None if described is None else store.environment(described)
+                    row["environment"] = store.environment(row.pop("described", worker))
                     store.record_trial({"id": trial.id, **row}, run, positions[trial.id])
                     display.advance()
             if study.timing is not None:
-                _time(store, run, study, planned, again=settings.rerun == "all")
+                known = set() if settings.rerun == "all" else store.timed() - outdated
+                _time(store, run, study, planned, known, worker)
         except KeyboardInterrupt:
             finished = sum(p.id in store.statuses() for p in planned)
             folder.export(store)
@@ -129,7 +146,7 @@ def time_study(study: Study, out: Path, command: str) -> ResultsFolder:
         described = environment(git_commit(), command)
         run = store.begin_run(manifest(study, len(planned), described), planned)
         try:
-            _time(store, run, study, planned, again=True)
+            _time(store, run, study, planned, set(), described)
         except KeyboardInterrupt:
             raise Interrupted(f"{len(store.timed())} cells are timed and kept") from None
         folder.export(store)
@@ -139,8 +156,9 @@ def time_study(study: Study, out: Path, command: str) -> ResultsFolder:
 
 def _check_rerun(rerun: str, planned: Sequence[PlannedTrial]) -> None:
     names = {text for p in planned for text in _names(p.trial)}
-    if rerun not in {"", "failed", "all", *names}:
-        raise unknown("what to rerun", rerun, ["failed", "all", *sorted(names)])
+    if rerun not in {"", *RERUNS, *names}:
+        where = f"({', '.join(RERUNS)}, or a formulation, scenario or solver of the study)"
+        raise unknown("what to rerun", rerun, [*RERUNS, *names], where)
 
 
 def _names(trial: Trial) -> set[str]:
@@ -219,9 +237,23 @@ def _row(future: Future[Any], trial: Trial, timeout: float) -> TrialRow:
 
 
 def _time(
-    store: Store, run: int, study: Study, planned: Sequence[PlannedTrial], *, again: bool
+    store: Store,
+    run: int,
+    study: Study,
+    planned: Sequence[PlannedTrial],
+    known: set[str],
+    described: TrialRow,
 ) -> None:
-    """Run the timing pass in one process of its own while no trial runs."""
+    """Run the timing pass in one process of its own while no trial runs.
+
+    Args:
+        store: where times are committed.
+        run: number of the run.
+        study: whose cells are timed.
+        planned: its trials.
+        known: ids of cells whose times are kept.
+        described: the environment.
+    """
     done, timing = store.statuses(), study.timing
     # A formulation that ended its process in a trial would do so again, and lose all times.
     fatal = {
@@ -238,7 +270,6 @@ def _time(
     )
     if not cells or timing is None:
         return
-    known: set[str] = set() if again else store.timed()
     scenarios = [
         scenario
         for scenario in map(parse_selector, study.scenarios)
@@ -248,6 +279,7 @@ def _time(
     if not scenarios:
         return
     arguments = (cells, timing.reference, timing.problems, timing.rounds)
+    made = store.environment(described)
     with (
         workers(1, (time_scenario.__module__,)) as pool,
         ProgressDisplay(len(scenarios), "timed scenarios") as display,
@@ -266,7 +298,8 @@ def _time(
                 reason = f"{type(error).__name__}: {error}".partition("\n")[0]
                 print(f"no times for {scenario}: {reason}", file=sys.stderr)
             for cell, row in zip(cells, rows, strict=False):
-                store.record_times({"id": timing_id(*cell, scenario), **row}, run)
+                named = {"id": timing_id(*cell, scenario), "environment": made}
+                store.record_times({**row, **named}, run)
             display.advance()
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar, Final
+from typing import Annotated, Any, ClassVar, Final
 
 import numpy as np
 import pinocchio as pin
@@ -124,6 +124,25 @@ class Family(Parameters, ABC):
     outruns_sampling: ClassVar[bool] = False
     judged: ClassVar[Judged] = "path"
     longest_path_run: ClassVar[float] = 5.0
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Refuse class variables of another kind than figures, checks and seeds need.
+
+        Raises:
+            DikbenchError: if there is one.
+        """
+        super().__init_subclass__(**options)
+        wanted: dict[str, tuple[bool, str]] = {
+            "variation": (isinstance(cls.variation, Variation), "Variation(start=0.1)"),
+            "robots": (_names(cls.robots), '("panda", "ur5")'),
+            "grid": (cls.grid is None or (_names(cls.grid) and len(cls.grid) == 2), '("x", "y")'),
+        }
+        for name, (fits, example) in wanted.items():
+            if not fits:
+                raise DikbenchError(
+                    f"class {cls.__qualname__}: {name} = {getattr(cls, name)!r} is not valid; "
+                    f"valid: such as {name} = {example}"
+                )
 
     @abstractmethod
     def case(self, robot: Robot, change: Perturbation) -> Case:
@@ -246,6 +265,10 @@ def _lateness(motion: OracleMotion | None, witness: Witness | None) -> float:
     if motion is None:
         return 0.0
     return float((np.diff(motion.instants) * np.maximum(motion.speed_ratio - 1, 0.0)).sum())
+
+
+def _names(value: object) -> bool:
+    return isinstance(value, tuple) and all(isinstance(name, str) for name in value)
 
 
 def _check_case(case: object) -> None:

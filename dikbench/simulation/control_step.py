@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 
 from dikbench.arrays import Array
-from dikbench.errors import CannotAnswer, Infeasible
+from dikbench.errors import CannotAnswer, Infeasible, in_words
 from dikbench.linear_algebra import shortest
 from dikbench.problem.problem import DikProblem, Formulation
 from dikbench.problem.velocity_box import velocity_box
@@ -69,8 +69,7 @@ def control_step(
     except MemoryError as error:
         raise TrialEnded(Status.OUT_OF_MEMORY, f"{type(error).__name__}: {error}") from error
     except Exception as error:
-        message = str(error).strip().partition("\n")[0]
-        raise TrialEnded(Status.FORMULATION_ERROR, f"{type(error).__name__}: {message}") from error
+        raise TrialEnded(Status.FORMULATION_ERROR, in_words(error)) from error
     formulation_ns = perf_counter_ns() - start - solve.checking_ns
     return StepAnswer(v, Status.OK, formulation_ns, _square(v, problem.robot.nv))
 

@@ -1,16 +1,20 @@
 """Who may be called first in a situation: a tie for success is not enough.
 
-A formulation is named first only if
+A formulation may be first (see `dependable`) only if it ran every case and
 
-- it ran every case, and its success cannot be told apart from the best (see `rates`);
-- of all cases that ask for motion it succeeds in more than half of what the best succeeds in, and
-  it is stopped by limits that it is told of, by collisions or failures in at most 5 % of all: who
-  stands still holds a pose well, and who ignores limits is accurate where none is near;
-- no other of those is faster beyond doubt, where the path may wait.
+- is stopped by limits that it is told of, by collisions or failures in at most 5 % of its trials:
+  who ignores limits is accurate where none is near;
+- succeeds, over all cases that ask for motion, in more than half of what the best of those
+  succeeds in: who stands still holds a pose well.
+
+Of these it is first in a situation if its success cannot be told apart from the best (see `rates`)
+and no other of them is faster beyond doubt, where the path may wait. Nothing else is compared, so
+that rows of formulations that may not be first change nothing.
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Final
 
 import numpy as np
@@ -19,7 +23,7 @@ import pandas as pd
 from dikbench.arrays import Array, Mask
 from dikbench.metrics import Outcome
 from dikbench.scenario.oracle import ORACLES
-from dikbench.statistics.success import Rates, paired_means, rates, succeeded
+from dikbench.statistics.success import Contender, Rates, paired_means, rates, succeeded
 from dikbench.statistics.trial_matrix import CONTENDER
 
 SMALLEST_SHARE_OF_BEST: Final = 0.5
@@ -41,8 +45,6 @@ BROKEN: Final = frozenset(
 )
 """Outcomes of trials in which a robot is stopped."""
 
-Contender = tuple[str, str]
-
 
 def dependable(trials: pd.DataFrame) -> set[Contender]:
     """Find the formulations that may be first in a situation.
@@ -54,43 +56,45 @@ def dependable(trials: pd.DataFrame) -> set[Contender]:
     if moving.empty:
         return set()
     overall = rates(moving, succeeded(moving))
-    competes = overall.whole & ~overall.contenders["formulation"].isin(ORACLES).to_numpy()
-    if not competes.any():
-        return set()
-    most = overall.rate[competes].max()
     told = ~trials["sees_constraints"].eq(0)
     stopped = (trials["outcome"].isin(BROKEN) & told).groupby([trials[k] for k in CONTENDER])
     share = stopped.mean()
-    return {
-        contender
-        for contender, rate, one in zip(
+    rate_of = {
+        contender: float(rate)
+        for contender, rate, whole in zip(
             overall.contenders.itertuples(index=False, name=None),
             overall.rate,
-            competes,
+            overall.whole,
             strict=True,
         )
-        if one
-        and rate > SMALLEST_SHARE_OF_BEST * most
-        and share.get(contender, 0.0) <= MOST_BROKEN_SHARE
+        if whole and contender[0] not in ORACLES and share[contender] <= MOST_BROKEN_SHARE
     }
+    most = max(rate_of.values(), default=0.0)
+    return {name for name, rate in rate_of.items() if rate > SMALLEST_SHARE_OF_BEST * most}
 
 
-def first_places(part: pd.DataFrame, found: Rates, candidates: set[Contender]) -> Mask:
+def told_of(part: pd.DataFrame, candidates: Collection[Contender]) -> set[Contender]:
+    """Leave out the formulations that are not told of the distances or torques of a situation."""
+    untold = part.loc[part["sees_constraints"].eq(0), CONTENDER].itertuples(index=False, name=None)
+    return set(candidates) - set(untold)
+
+
+def first_places(part: pd.DataFrame, found: Rates) -> Mask:
     """Say who is first in a situation, (k,).
 
     Args:
         part: the rows of the situation that count.
-        found: their rates of success.
-        candidates: who may be first (see `dependable`).
+        found: their rates of success, among those that may be first.
     """
-    contenders = list(found.contenders.itertuples(index=False, name=None))
-    may_be = np.array([contender in candidates for contender in contenders], dtype=bool)
-    first: Mask = np.asarray(found.best & may_be)
-    return first & ~_slower(part, found, first)
+    return found.best & ~_slower(part, found, found.best)
 
 
 def _asks_for_motion(trials: pd.DataFrame) -> pd.Series:
-    """Say which trials are of cases that standing still does not do: of others nobody learns."""
+    """Say which trials are of cases that standing still does not do: of others nobody learns.
+
+    A target at rest is near enough at the start where some robot never was farther from it than
+    the tolerance.
+    """
     least = trials.groupby(["scenario", "seed"])["tracking_error_6d_max_m"].transform("min")
     at_rest = trials["judged_by_path"].eq(0)
     found: pd.Series = ~(at_rest & least.le(trials["tolerance_m"].astype(float)))

@@ -7,6 +7,7 @@ scenarios that a known motion can do; of the others nobody knows whether anythin
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
@@ -23,6 +24,9 @@ from dikbench.statistics.trial_matrix import TrialMatrix
 Setting = Literal["path", "time"]
 """Whether the path may wait, or the clock does not wait."""
 
+Contender = tuple[str, str]
+"""A formulation and its solver."""
+
 DONE: Final = frozenset({Outcome.SUCCESS.value, Outcome.RECOVERED.value})
 """The outcomes of trials in which the robot did its job."""
 
@@ -37,7 +41,8 @@ def with_facts(trials: pd.DataFrame) -> pd.DataFrame:
     """Fill in what trials that did not run lack of their scenario, from those that did."""
     texts = trials[list(FACTS)].replace("", np.nan)
     filled = texts.groupby([trials["scenario"], trials["seed"]], sort=False).transform("first")
-    return trials.assign(**{name: filled[name] for name in FACTS})
+    whole = trials.copy()  # in one block, whatever was added to it before
+    return whole.assign(**{name: filled[name] for name in FACTS})
 
 
 def counted(trials: pd.DataFrame, setting: Setting) -> pd.DataFrame:
@@ -81,9 +86,10 @@ class Rates:
         rate: the rate of each, (k,); NaN where it ran no trial.
         trials: number of its trials, (k,).
         whole: whether it ran every case, (k,).
-        difference: of its rate to the best one's, over the cases of both, (k,); at most 0.
+        difference: of its rate to that of the best that competes, over the cases of both, (k,).
         lower, upper: the paired 95 % interval of that, (k,).
-        best: whether it is, or cannot be told apart from, the best of those that ran every case.
+        best: whether it competes and is the best, or cannot be told apart from it and is at least
+            as good as everybody that can.
     """
 
     layout: TrialMatrix
@@ -99,15 +105,19 @@ class Rates:
     best: Mask
 
 
-def rates(trials: pd.DataFrame, done: Mask) -> Rates:
+def rates(
+    trials: pd.DataFrame, done: Mask, candidates: Collection[Contender] | None = None
+) -> Rates:
     """Compute the rates of success of every formulation, and compare each with the best.
 
     The intervals are those of paired differences under a bootstrap over families, scenarios and
-    seeds. Oracles do not compete.
+    seeds. Who did not run every case does not compete, nor do oracles.
 
     Args:
         trials: rows that count (see `counted`).
         done: whether the robot did its job in each.
+        candidates: who competes; default: everybody that can. Where none of them can, the rates
+            are compared with the best of all, and nobody is `best`.
     """
     layout = TrialMatrix.of(trials)
     matrix = layout.fill(done.astype(float))
@@ -116,6 +126,11 @@ def rates(trials: pd.DataFrame, done: Mask) -> Rates:
     rate, ran_there = weighted_means(matrix, base), ~np.isnan(matrix)
     whole: Mask = np.asarray(ran_there.all(axis=0))
     competes: Mask = whole & ~layout.contenders["formulation"].isin(ORACLES).to_numpy()
+    may_win = competes
+    if candidates is not None:
+        pairs = layout.contenders.itertuples(index=False, name=None)
+        may_win = competes & np.array([pair in candidates for pair in pairs], dtype=bool)
+        competes = may_win if may_win.any() else competes
     nothing = np.full(len(rate), np.nan)
     drawn = draw_weights(list(cases["scenario_family"]), list(cases["scenario"])) * base
     found = Rates(
@@ -126,7 +141,9 @@ def rates(trials: pd.DataFrame, done: Mask) -> Rates:
         return found
     first = int(np.flatnonzero(competes)[rate[competes].argmax()])
     difference, lower, upper = paired_means(matrix - matrix[:, [first]], found)
-    best: Mask = np.asarray(competes & (upper >= 0) & (rate > 0))
+    told_apart = rate[competes & (upper < 0)]
+    at_least = told_apart.max() if len(told_apart) else 0.0
+    best: Mask = np.asarray(may_win & (upper >= 0) & (rate > 0) & (rate >= at_least))
     return replace(found, difference=difference, lower=lower, upper=upper, best=best)
 
 

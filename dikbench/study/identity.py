@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import json
 import os.path
+from collections.abc import Mapping
 from dataclasses import astuple, fields, is_dataclass
 from functools import lru_cache
 from typing import Any
 
+from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_formulation, make_plant, scenario_parameters
 from dikbench.plugins.finding import formulation_plugin, scenario_plugin
 from dikbench.plugins.source import digest, digest_of_file, source_digest
 from dikbench.scenario.oracle import ORACLES
-from dikbench.selector import Selector
+from dikbench.selector import Selector, parse_selector
 from dikbench.solvers.catalogue.back_ends import Solver, parse_solver
 from dikbench.study.trial import NO_SOLVER, Trial
 
@@ -36,6 +38,22 @@ def trial_id(trial: Trial) -> str:
 def timing_id(formulation: Selector, solver: Selector, scenario: Selector) -> str:
     """Return the id of what is timed: `trial_id` without how a trial is run."""
     return digest(json.dumps((_formulation(formulation), _solver(solver), scenario_id(scenario))))
+
+
+def trial_id_today(row: Mapping[str, Any]) -> str | None:
+    """Return the id that the trial of a row has today; None where a part of it is gone."""
+    try:
+        return trial_id(Trial.of(**row))
+    except DikbenchError:  # the formulation's file is gone, the scenario has another parameter
+        return None
+
+
+def timing_id_today(formulation: str, solver: str, scenario: str) -> str | None:
+    """Return the id that what was timed has today; None where a part of it is gone."""
+    try:
+        return timing_id(*map(parse_selector, (formulation, solver, scenario)))
+    except DikbenchError:
+        return None
 
 
 @lru_cache(maxsize=4096)

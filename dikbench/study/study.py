@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
@@ -11,13 +11,23 @@ from typing import Annotated, Any, Final, Literal
 import msgspec
 
 from dikbench.errors import DikbenchError, unknown
-from dikbench.plugins.building import in_declared_order, make_formulation
+from dikbench.plugins.building import (
+    in_declared_order,
+    make_formulation,
+    make_plant,
+    scenario_parameters,
+)
 from dikbench.problem.problem import program_of
 from dikbench.programs.quadratic_program import ProgramKind
 from dikbench.scenario.oracle import ORACLES
 from dikbench.scenario.plant import REFERENCE_MODES
 from dikbench.selector import Selector, alternatives, parse_selector
-from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER
+from dikbench.solvers.catalogue.back_ends import (
+    BACK_ENDS,
+    DEFAULT_SOLVER,
+    is_installed,
+    parse_solver,
+)
 from dikbench.study.split import SPLITS
 
 DEFAULT_STUDY = "quick"
@@ -109,7 +119,35 @@ def load_study(name_or_file: str) -> Study:
         raise DikbenchError(f"study {path}: {_explained(str(error))}") from None
     except msgspec.DecodeError as error:
         raise DikbenchError(f"study {path}: not valid TOML: {error}") from None
-    return _spread(msgspec.structs.replace(study, name=study.name or path.stem))
+    try:
+        spread = _spread(msgspec.structs.replace(study, name=study.name or path.stem))
+    except DikbenchError as error:
+        raise DikbenchError(f"study {path}: {error}") from None
+    _check_values(spread, path)
+    return spread
+
+
+def _check_values(study: Study, path: Path) -> None:
+    """Build what each selector of a file names, so that an error says where it stands.
+
+    Raises:
+        DikbenchError: on the first selector that does not name anything valid.
+    """
+    makers: dict[str, Callable[[str], object]] = {
+        "scenarios": scenario_parameters,
+        "plants": make_plant,
+    }
+    named = [(axis, text, makers[axis]) for axis in makers for text in getattr(study, axis)]
+    for number, cell in enumerate(study.cells):
+        for text in cell.formulations:
+            named.append((f"cells[{number}].formulations", text, _program_of))
+        for text in cell.solvers:
+            named.append((f"cells[{number}].solvers", text, _check_solver))
+    for where, text, make in named:
+        try:
+            make(text)
+        except DikbenchError as error:
+            raise DikbenchError(f"study {path}: {where}: {error}") from None
 
 
 def _spread(study: Study) -> Study:
@@ -155,6 +193,13 @@ def _explained(reason: str) -> str:
     place = Cells if "$.cells" in reason else TimingSettings if "$.timing" in reason else Study
     valid = ", ".join(field.name for field in msgspec.structs.fields(place))
     return f"{reason}; valid keys: {valid}"
+
+
+def _check_solver(text: str) -> None:
+    """Check a solver's selector, unless its library is missing here, which a plan says."""
+    name = parse_selector(text).name
+    if name not in BACK_ENDS or is_installed(name):
+        parse_solver(text)
 
 
 class Selection(msgspec.Struct, frozen=True):
@@ -206,7 +251,7 @@ def select(base: Study, selection: Selection, *, named: bool) -> Study:
 
 
 def _cells_for(base: Study, formulation: Selector, named: bool) -> Cells:
-    program = _program(formulation)
+    program = _program_of(formulation)
     if program is None:
         return Cells((str(formulation),))
     if named:
@@ -216,8 +261,8 @@ def _cells_for(base: Study, formulation: Selector, named: bool) -> Cells:
     return Cells((str(formulation),), (DEFAULT_SOLVER[program],))
 
 
-def _program(formulation: Selector) -> ProgramKind | None:
+def _program_of(formulation: str | Selector) -> ProgramKind | None:
     """Return what a formulation needs a solver for; the oracles need none."""
-    if formulation.name in ORACLES:
+    if parse_selector(formulation).name in ORACLES:
         return None
     return program_of(make_formulation(formulation))

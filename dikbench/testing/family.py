@@ -20,7 +20,7 @@ from typing import Any, Final, Union, get_args, get_origin
 import numpy as np
 
 from dikbench.arrays import Array
-from dikbench.errors import DikbenchError
+from dikbench.errors import DikbenchError, in_words
 from dikbench.parameters import Parameter, parameters_of
 from dikbench.scenario.certificate import CertificateFailed
 from dikbench.scenario.family import Family
@@ -76,7 +76,7 @@ def check_family_ranges(family: Family) -> None:
             except DikbenchError:
                 pass  # it says why there is no such scenario
             except Exception as error:
-                raise AssertionError(f"{name}={value}: raised {_words(error)}") from error
+                raise AssertionError(f"{name}={value}: raised {in_words(error)}") from error
 
 
 def _changed(family: Family, name: str, value: object) -> Family:
@@ -137,7 +137,7 @@ def check_family_parts(family: Family) -> None:
         except MemoryError:
             raise
         except Exception as error:
-            raise AssertionError(f"seed {seed}: raised {_words(error)}") from error
+            raise AssertionError(f"seed {seed}: raised {in_words(error)}") from error
         if wrong:
             raise AssertionError(f"seed {seed}: {wrong}")
 
@@ -193,11 +193,7 @@ def _scenario(family: Family, seed: int) -> Scenario:
     except DikbenchError as error:
         raise AssertionError(f"seed {seed}: {error}") from error
     except Exception as error:
-        raise AssertionError(f"seed {seed}: raised {_words(error)}") from error
-
-
-def _words(error: Exception) -> str:
-    return f"{type(error).__name__}: {error}".partition("\n")[0]
+        raise AssertionError(f"seed {seed}: raised {in_words(error)}") from error
 
 
 def _difference(a: Scenario, b: Scenario) -> str:

@@ -130,7 +130,7 @@ def test_what_a_class_declares() -> None:
     assert (gain.type, gain.default, gain.required) == (float, 0.7, False)
     assert gain.range == Range(0.1, 3.0, "1/s")
     assert gain.drawn == Drawn(0.3, 2.0, log=True)
-    assert gain.valid == "0.1 to 3 [1/s]"
+    assert gain.valid == "a number, 0.1 to 3 [1/s]"
     assert (found["side"].choices, found["side"].valid) == (("left", "right"), "left, right")
     assert not found["side"].hidden
     assert found["share"].range is None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import product
 
 import numpy as np
 import pytest
@@ -44,13 +45,13 @@ def _problem() -> DikProblem:
     raise AssertionError("no state has everything")
 
 
-def _spoiled(place: str, bad: float) -> DikProblem:
+def _spoiled(place: str, bad: float, entry: int = -1) -> DikProblem:
     problem = _problem()
     second = problem.tasks[1]
     second.J = second.J.copy()  # that of a posture is shared, and read-only
     part = PLACES[place](problem)
     assert part is not None
-    part[(-1,) * part.ndim] = bad
+    part[(entry,) * part.ndim] = bad
     problem.__post_init__()  # the stacked levels hold copies
     return problem
 
@@ -74,15 +75,15 @@ def test_a_problem_that_is_not_finite_ends_the_trial(name: str, place: str, bad:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_no_formulation_makes_numbers_of_what_is_none(name: str) -> None:
-    """Asked without the harness, with NaN or infinity in J or V: no finite velocity."""
-    for place in ("J of task 1", "V of task 1"):
-        for bad in (np.nan, np.inf):
-            try:
-                with np.errstate(all="ignore"):
-                    v = make_formulation(name).velocity(_spoiled(place, bad), _solve(name))
-            except (CannotAnswer, ValueError):  # cvxpy takes no NaN
-                continue
-            assert not np.isfinite(v).all(), (place, bad)
+    """Asked without the harness, with NaN or infinity in J or V: no finite velocity, and an end."""
+    places, entries = ("J of task 1", "V of task 1"), (0, -1)
+    for place, bad, entry in product(places, (np.nan, np.inf), entries):
+        try:
+            with np.errstate(all="ignore"):
+                v = make_formulation(name).velocity(_spoiled(place, bad, entry), _solve(name))
+        except (CannotAnswer, ValueError):  # cvxpy takes no NaN
+            continue
+        assert not np.isfinite(v).all(), (place, bad, entry)
 
 
 @pytest.mark.filterwarnings("ignore:overflow")
@@ -99,10 +100,11 @@ def test_an_infinite_bound_and_huge_numbers_are_finite_problems() -> None:
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_decompositions_of_what_is_not_finite_hold_no_numbers() -> None:
-    """LAPACK leaves zeros behind: a null space of zeros, an inverse that is zero."""
-    A, b = np.arange(12.0).reshape(3, 4), np.ones(3)
-    for bad in (np.nan, np.inf):
-        A[1, 2] = bad
+    """LAPACK leaves zeros behind, an inverse that is zero, or never ends."""
+    b = np.ones(3)
+    for bad, place in product((np.nan, np.inf), ((0, 0), (1, 2), (2, 3))):
+        A = np.arange(12.0).reshape(3, 4)
+        A[place] = bad
         found = [
             *linear_algebra.thin_svd(A),
             linear_algebra.pseudo_inverse(A, 1e-6),

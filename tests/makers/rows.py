@@ -10,19 +10,39 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
-from dikbench.metrics import METRICS
+from dikbench.metrics import METRICS, OUTCOME_NUMBERS, OUTCOME_TEXTS
 from dikbench.results.columns import CONTROL_RATES_HZ, KEYS, SEES, SELECTORS, TIMES
 from dikbench.results.selected import selected_columns, with_selected
 
 Values = Mapping[str, Any]
+
+DONE: Final[Values] = {
+    **dict.fromkeys(OUTCOME_TEXTS, ""),
+    "outcome": "success",
+    "off_path_by": "position",
+    "feasible": "time",
+    "situation": "free space",
+    "robot": "ur5",
+    **dict.fromkeys(OUTCOME_NUMBERS, float("nan")),
+    "outcome_step": -1.0,
+    "chatters": 0.0,
+    "judged_by_path": 1.0,
+    "path_extent_m": 0.5,
+    "tolerance_m": 0.005,
+    "speed_need": 0.5,
+}
+"""The outcome of a trial in free space that did its job."""
 
 FAULTLESS: Final[Values] = {
     "status": "ok",
     "message": "",
     "steps": 100,
     **{name: 0.0 for name in METRICS},
+    **DONE,
     "progress_mean": 1.0,
     "progress_min": 1.0,
+    "path_done_share": 1.0,
+    "slow_down": 1.0,
     "velocity_peak_ratio": 0.5,
     "claimed_share": float("nan"),
     "verified_share": float("nan"),
@@ -105,6 +125,7 @@ def random_rows(
     }
     table = table.assign(**drawn | {"timing_samples": 100, "timing_stability": "stable"})
     table["progress_mean"] = table["progress_min"] = 1.0 - table["progress_mean"].clip(upper=1.0)
+    table = table.copy().assign(**DONE, **dict.fromkeys(SEES, np.nan))
     missed = {f"missed_{rate}_hz_share": 0.0 for rate in CONTROL_RATES_HZ}
     return with_selected(table.assign(**missed).copy())  # in one block
 

@@ -343,7 +343,7 @@ def test_redundant_arms_hold_a_posture_and_others_have_no_second_task(selector: 
             "reach[gain=20]",
             ["certificate of 'reach[gain=20]' failed: ", "required speed over limit"],
         ),
-        ("reach[robot=panda,frame=nowhere]", ["unknown frame 'nowhere'", "panda_hand_tcp"]),
+        ("reach[robot=panda,frame=nowhere]", ["unknown frame 'nowhere'", "panda_hand"]),
     ],
 )
 def test_impossible_scenarios_are_errors_of_one_line(selector: str, parts: list[str]) -> None:

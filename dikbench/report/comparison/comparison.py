@@ -8,12 +8,15 @@ from pathlib import Path
 
 import pandas as pd
 
+from dikbench.metrics import METRICS
 from dikbench.report.comparison.differences import formulation_differences, trial_differences
+from dikbench.report.comparison.gate import breaches
 from dikbench.report.comparison.matching import MatchedTrials, match_trials
+from dikbench.report.comparison.success_changes import success_changes
 from dikbench.report.comparison.times import time_ratios
 from dikbench.report.comparison.tolerances import Tolerance
 from dikbench.report.comparison.versions import same_machine, version_differences
-from dikbench.results.reading import read_results
+from dikbench.results.reading import read_results, without_attributes
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,30 +27,37 @@ class Comparison:
         a, b: the folders.
         matched: their trials.
         formulations: see `formulation_differences`.
+        success: see `success_changes`.
         times: see `time_ratios`.
         versions: see `version_differences`.
         same_machine: whether times can be compared at all.
         guarded: whether any tolerance was given.
+        breaches: see `breaches`.
     """
 
     a: Path
     b: Path
     matched: MatchedTrials
     formulations: pd.DataFrame
+    success: pd.DataFrame
     times: pd.DataFrame
     versions: list[tuple[str, str, str]]
     same_machine: bool
     guarded: bool
-
-    @property
-    def beyond(self) -> int:
-        """Number of metrics of trials that are beyond a tolerance."""
-        return int(self.formulations["beyond"].sum()) if len(self.formulations) else 0
+    breaches: tuple[str, ...]
 
     @property
     def regressed(self) -> bool:
-        """Whether a tolerance is exceeded or, where one was given, a trial newly fails."""
-        return self.guarded and (self.beyond > 0 or self.matched.newly_failed > 0)
+        """Whether B is worse than the tolerances allow."""
+        return bool(self.breaches)
+
+    @property
+    def nothing_differs(self) -> bool:
+        """Whether both have the same trials, with the same statuses, outcomes and metrics."""
+        matched = self.matched
+        alone = len(matched.only_a) + len(matched.only_b)
+        moved = self.success[["lost", "gained"]].to_numpy().sum() if len(self.success) else 0
+        return not alone and matched.status_changes.empty and self.formulations.empty and not moved
 
     def trials(self) -> pd.DataFrame:
         """Every difference, trial by trial (see `trial_differences`)."""
@@ -61,15 +71,20 @@ def compare(a: Path, b: Path, tolerances: Sequence[Tolerance] = ()) -> Compariso
         DikbenchError: if one of them holds no results, they have nothing in common, or a tolerance
             is on a metric that one of them lacks.
     """
-    of_a, of_b = read_results(a), read_results(b)
+    of_a, of_b = (without_attributes(read_results(folder)) for folder in (a, b))
     matched = match_trials(of_a.trials, of_b.trials, (str(a), str(b)))
+    on_metrics = [tolerance for tolerance in tolerances if tolerance.metric in METRICS]
+    formulations = formulation_differences(matched, on_metrics)
+    success, times = success_changes(matched), time_ratios(matched)
     return Comparison(
         a,
         b,
         matched,
-        formulation_differences(matched, tolerances),
-        time_ratios(matched),
+        formulations,
+        success,
+        times,
         version_differences(of_a.manifest, of_b.manifest),
         same_machine(of_a.manifest, of_b.manifest),
         bool(tolerances),
+        breaches(matched, formulations, success, times, tolerances),
     )

@@ -23,12 +23,21 @@ SMALL: Final = 1e-4
 """To sort by them, worsenings are put in relation to the value in A, but to no less than this [m,
 rad, ...]: rounding on top of nothing is no regression to begin with."""
 
+ROUNDING: Final = 1e-9
+"""Values that differ by no more than this share of the larger one, or of `SMALL`, are the same."""
+
 
 def difference(a: Array, b: Array) -> Array:
-    """B - A; 0 where both are the same infinity or both undefined, NaN where one is undefined."""
-    same = (a == b) | (np.isnan(a) & np.isnan(b))
+    """Compute B - A; NaN where one is undefined.
+
+    It is 0 where both are the same infinity, both undefined, or the same but for rounding.
+    """
+    finite = np.isfinite(a) & np.isfinite(b)
     with np.errstate(invalid="ignore"):  # the same infinity twice
-        return np.where(same, 0.0, b - a)
+        apart = b - a
+        scale = ROUNDING * np.maximum(np.maximum(np.abs(a), np.abs(b)), SMALL)
+        same = (a == b) | (np.isnan(a) & np.isnan(b)) | (finite & (np.abs(apart) <= scale))
+    return np.where(same, 0.0, apart)
 
 
 def worsening(metric: str, a: Array, b: Array) -> Array:
@@ -63,7 +72,7 @@ def trial_differences(matched: MatchedTrials) -> pd.DataFrame:
                 worsening=worse[changed],
             )
         )
-        severities.append(_severity(worse, a)[changed])
+        severities.append(_severity(worse, a, b)[changed])
     order = np.argsort(-np.concatenate(severities), kind="stable")
     return pd.concat([frame for frame in frames if len(frame)] or frames).iloc[order]
 
@@ -119,10 +128,10 @@ def _rows(
 ) -> list[dict[str, Any]]:
     """Return the rows of one formulation: per metric that changed its values in A and B, (n,)."""
     weights = draw_weights(list(trials["scenario_family"]), list(trials["scenario"]))
-    finite = {
-        metric: np.where(np.isfinite(a) & np.isfinite(b), b - a, np.nan)
-        for metric, (a, b) in changed.items()
-    }
+    finite = {}
+    for metric, (a, b) in changed.items():
+        apart = difference(a, b)
+        finite[metric] = np.where(np.isfinite(a) & np.isfinite(apart), apart, np.nan)
     intervals = mean_intervals(np.column_stack(list(finite.values())), weights)
     rows = []
     for (metric, (a, b)), interval in zip(changed.items(), intervals, strict=True):
@@ -144,7 +153,7 @@ def _rows(
                 "worst_difference": difference(a, b)[worst],
                 "scenario": trials["scenario"].iloc[worst],
                 "seed": trials["seed"].iloc[worst],
-                "severity": _severity(worse, a).max(),
+                "severity": _severity(worse, a, b).max(),
             }
         )
     return rows
@@ -161,7 +170,11 @@ def _values(matched: MatchedTrials) -> dict[str, tuple[Array, Array]]:
     return {m: (a[m].to_numpy(float), b[m].to_numpy(float)) for m in matched.metrics}
 
 
-def _severity(worse: Array, a: Array) -> Array:
-    """A worsening in relation to the value in A."""
-    share: Array = worse / np.maximum(np.where(np.isfinite(a), np.abs(a), 0.0), SMALL)
-    return share
+def _severity(worse: Array, a: Array, b: Array) -> Array:
+    """Put a worsening in relation to the value in A.
+
+    A metric that B does not define comes after every number that became worse: it follows from
+    what happened to the trial and does not say it.
+    """
+    share = worse / np.maximum(np.where(np.isfinite(a), np.abs(a), 0.0), SMALL)
+    return np.where(np.isnan(b) & (worse > 0), np.finfo(float).tiny, share)

@@ -20,6 +20,9 @@ from dikbench.study.trial import Trial
 RANKS: Final[Mapping[str, int]] = MappingProxyType({Status.OK.value: 2, Status.SKIPPED.value: 1})
 """How good a status is; every other one is a failure, 0."""
 
+MOST_STEPS: Final = 0.5
+"""A solver that fails in more than this share of a trial's steps fails in the trial."""
+
 
 @dataclass(frozen=True, eq=False)
 class MatchedTrials:
@@ -27,7 +30,7 @@ class MatchedTrials:
 
     Attributes:
         a, b: the rows of the trials that both have, row by row the same trial.
-        only_a, only_b: the trials that one of them has alone, columns `TRIAL`.
+        only_a, only_b: the trials that one of them has alone, columns `TRIAL` and `status`.
         metrics: the metrics that both have, in the registry's order.
         unmatched_columns: what is said of metrics that are not compared.
     """
@@ -49,6 +52,19 @@ class MatchedTrials:
     def newly_failed(self) -> int:
         """Number of trials that end worse in B."""
         return int((self.rank_change < 0).sum())
+
+    @property
+    def missing(self) -> int:
+        """Number of trials that ran in A and that B lacks."""
+        return int(self.only_a["status"].ne(Status.SKIPPED.value).sum())
+
+    @cached_property
+    def solver_newly_fails(self) -> pd.Series:
+        """Whether a trial's solver fails in steps in B and in none in A, or newly in most."""
+        if "solver_failed_share" not in self.metrics:
+            return pd.Series(False, self.a.index)
+        before, after = (rows["solver_failed_share"].fillna(0.0) for rows in (self.a, self.b))
+        return (after.gt(0) & before.eq(0)) | (after.gt(MOST_STEPS) & before.le(MOST_STEPS))
 
     @cached_property
     def status_changes(self) -> pd.DataFrame:
@@ -107,8 +123,8 @@ def match_trials(
     return MatchedTrials(
         a.iloc[both["at_a"]].reset_index(drop=True),
         b.iloc[both["at_b"]].reset_index(drop=True),
-        a.drop(a.index[both["at_a"]])[TRIAL],
-        b.drop(b.index[both["at_b"]])[TRIAL],
+        a.drop(a.index[both["at_a"]])[[*TRIAL, "status"]],
+        b.drop(b.index[both["at_b"]])[[*TRIAL, "status"]],
         metrics,
         _unmatched_columns(a, b),
     )

@@ -11,24 +11,31 @@ import pandas as pd
 
 from dikbench.errors import DikbenchError
 from dikbench.report.comparison.comparison import Comparison
+from dikbench.report.comparison.gate import SOLVER_FAILED
 from dikbench.report.comparison.matching import trial_name
+from dikbench.report.selection.judged import IN_WORDS
+from dikbench.report.sentences.words import several
 from dikbench.report.tables.markdown import escape, markdown_rows
+from dikbench.results.columns import TRIAL
 
 ON_CONSOLE: Final = 20
 """So many rows of a list are printed; a file holds all."""
 
 
 def render(comparison: Comparison, rows: int | None = ON_CONSOLE) -> str:
-    """The comparison as Markdown, regressions first.
+    """Write the comparison as Markdown: the verdict in the first line, then regressions first.
 
     Args:
         comparison: what is shown.
         rows: of each list, at most so many; None: all.
     """
     parts = [
+        _verdict(comparison),
         f"# {comparison.a} (A) and {comparison.b} (B)",
         _summary(comparison),
         *_statuses(comparison, rows),
+        *_solvers(comparison, rows),
+        *_success(comparison, rows),
         *_metrics(comparison, rows),
         *_times(comparison, rows),
         *_alone(comparison, rows),
@@ -55,27 +62,72 @@ def write(comparison: Comparison, file: Path) -> None:
         raise DikbenchError(f"file {file}: {error.strerror or error}") from None
 
 
+def _verdict(comparison: Comparison) -> str:
+    """Say in one line whether B passes."""
+    if comparison.regressed:
+        return f"REGRESSED: {'; '.join(comparison.breaches)}."
+    same = "no difference" if comparison.nothing_differs else ""
+    if comparison.guarded:
+        return f"Within tolerance{': ' if same else ''}{same}."
+    return f"{same or 'B differs from A; without --tolerance nothing is judged'}.".capitalize()
+
+
 def _summary(comparison: Comparison) -> str:
     matched, formulations = comparison.matched, comparison.formulations
-    told = [f"{len(matched.a)} trials are in both, {int(matched.both_ok.sum())} ended ok in both."]
-    worse = matched.newly_failed
+    both, ok = len(matched.a), int(matched.both_ok.sum())
+    told = [f"{several(both, 'trial')} in both, of which {ok} ended ok in both."]
     if len(matched.status_changes):
-        told.append(f"{len(matched.status_changes)} changed their status, {worse} to the worse.")
+        told.append(
+            f"{len(matched.status_changes)} changed their status, {matched.newly_failed} to the "
+            "worse."
+        )
     if formulations.empty:
-        told.append("No metric differs.")
+        told.append("No metric differs by more than rounding.")
     else:
         told.append(
             f"Of the metrics {int((formulations['worse'] > 0).sum())} became worse in a trial and "
             f"{int((formulations['worse'] == 0).sum())} in none."
         )
-    if comparison.guarded:
-        beyond = comparison.beyond
-        told.append(
-            f"REGRESSED: {beyond} beyond tolerance, {worse} newly failed."
-            if comparison.regressed
-            else "Within tolerance."
-        )
     return " ".join(told)
+
+
+def _solvers(comparison: Comparison, rows: int | None) -> list[str]:
+    matched = comparison.matched
+    newly = matched.solver_newly_fails
+    if not newly.any():
+        return []
+    shares = matched.a[TRIAL].assign(
+        before=matched.a[SOLVER_FAILED].fillna(0.0), after=matched.b[SOLVER_FAILED]
+    )[newly]
+    lines = [
+        f"- {100 * row['before']:.3g} -> {100 * row['after']:.3g} % of the steps without an "
+        f"answer: {escape(trial_name(row))}"
+        for row in _records(shares.head(_most(rows, shares)))
+    ]
+    return ["## Solvers that newly fail", "\n".join([*lines, *_more(rows, shares)])]
+
+
+def _success(comparison: Comparison, rows: int | None) -> list[str]:
+    found = comparison.success
+    if found.empty or not found[["lost", "gained"]].to_numpy().any():
+        return []
+    moved = found[found["lost"].gt(0) | found["gained"].gt(0)]
+    moved = moved.iloc[(moved["rate_b"] - moved["rate_a"]).argsort(kind="stable")]
+    head = moved.head(_most(rows, moved))
+    table = pd.DataFrame(
+        {
+            "formulation": head["formulation"],
+            "solver": head["solver"],
+            "plant": head["plant"],
+            "setting": [IN_WORDS[setting] for setting in head["setting"]],
+            "A %": (100 * head["rate_a"]).map(_number),
+            "B %": (100 * head["rate_b"]).map(_number),
+            "lost/gained/trials": [
+                f"{row['lost']}/{row['gained']}/{row['trials']}" for row in _records(head)
+            ],
+        }
+    )
+    return ["## Success", "\n".join([markdown_rows(table), *_more(rows, moved)])]
 
 
 def _statuses(comparison: Comparison, rows: int | None) -> list[str]:
@@ -190,7 +242,7 @@ def _more(rows: int | None, table: pd.DataFrame) -> list[str]:
 
 
 def _number(value: float) -> str:
-    return f"{value:.4g}"
+    return "" if math.isnan(value) else f"{value:.4g}"
 
 
 def _signed(value: float) -> str:

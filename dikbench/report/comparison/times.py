@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -13,6 +15,11 @@ from dikbench.statistics.hierarchical_bootstrap import draw_weights, mean_interv
 from dikbench.statistics.stability import STABLE
 
 COMPARED: Final = ("formulation_time_median_us", "formulation_time_p99_us")
+
+RATIOS: Final[Mapping[str, str]] = MappingProxyType(
+    dict(zip(COMPARED, ("ratio", "p99_ratio"), strict=True))
+)
+"""The column of `time_ratios` of each column of times."""
 
 
 def time_ratios(matched: MatchedTrials) -> pd.DataFrame:
@@ -49,3 +56,9 @@ def time_ratios(matched: MatchedTrials) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows)
+
+
+def untimed(matched: MatchedTrials) -> int:
+    """Count the cells of trials in both that have times in A and none in B."""
+    timed = [rows.get(COMPARED[0], pd.Series(dtype=float)).gt(0) for rows in (matched.a, matched.b)]
+    return int((timed[0] & ~timed[1] & ~matched.a.duplicated(TIMED)).sum())

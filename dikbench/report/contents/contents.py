@@ -124,7 +124,7 @@ def gather(results: Results, figures: Sequence[Figure]) -> Contents:
     """
     trials = results.trials
     unknown = [name for name in METRICS if trials[name].isna().all()]
-    measured = trials.drop(columns=unknown)
+    measured = trials.drop(columns=unknown).copy()  # columns lie apart after it
     return Contents(
         results,
         summarise(trials),

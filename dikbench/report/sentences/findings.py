@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -13,22 +14,30 @@ from dikbench.arrays import Mask
 from dikbench.metrics import Outcome
 from dikbench.report.selection.judged import IN_WORDS
 from dikbench.report.sentences.words import (
-    Contender,
     Names,
     listed,
-    millimetres,
     number,
     several,
 )
 from dikbench.statistics.failures import ran
-from dikbench.statistics.first_places import first_places
+from dikbench.statistics.first_places import first_places, told_of
 from dikbench.statistics.stability import LARGEST_DRIFT_SHARE as DRIFT
 from dikbench.statistics.stability import STABLE
-from dikbench.statistics.success import Rates, Setting, paired_means, rates, succeeded
+from dikbench.statistics.success import (
+    Contender,
+    Rates,
+    Setting,
+    paired_means,
+    rates,
+    succeeded,
+)
 from dikbench.statistics.trial_matrix import CONTENDER
 
 SMALLEST_DISTANCE_M: Final = 1e-5
 """Distances from the path below this are equally small: what is left is the sampling."""
+
+NEARER: Final = 1.05
+"""Who is nearer to the path is so by more than this ratio."""
 
 SAME_SHARE: Final = 0.01
 """Shares that differ by less than this part of the larger one are the same."""
@@ -53,17 +62,19 @@ class Leaders:
 
     Attributes:
         contenders: the formulations that are first.
+        alone: whether somebody else that may be first is not: else nobody stands out.
         found: the rates of all.
         finding: the sentence.
     """
 
     contenders: tuple[Contender, ...]
+    alone: bool
     found: Rates
     finding: Finding
 
 
 def leaders(
-    part: pd.DataFrame, setting: Setting, candidates: set[Contender], names: Names
+    part: pd.DataFrame, setting: Setting, candidates: Collection[Contender], names: Names
 ) -> Leaders | None:
     """Say who succeeds most in a situation; None where nobody can be named.
 
@@ -73,22 +84,36 @@ def leaders(
         candidates: who may be named (see `dependable`).
         names: how formulations are called.
     """
-    found = rates(part, succeeded(part))
-    first = first_places(part, found, candidates)
+    may_be = told_of(part, candidates)
+    found = rates(part, succeeded(part), may_be)
+    first = first_places(part, found)
     if not first.any():
         return None
-    all_names = list(found.contenders.itertuples(index=False, name=None))
+    every = list(found.contenders.itertuples(index=False, name=None))
+    rivals = np.array([name in may_be for name in every]) & found.whole
+    alone = rivals.sum() == 1 or bool((rivals & ~first).any())
     order = sorted(np.flatnonzero(first), key=lambda k: -found.rate[k])
+    if alone:
+        question = f"First where {IN_WORDS[setting]}"
+        said = _with_shares([(every[k], found.rate[k]) for k in order], names)
+        said += ", not told apart" if len(order) > 1 else ""
+        said += _next(found, rivals & ~first, every, names)
+    else:
+        question = f"Nobody stands out where {IN_WORDS[setting]}"
+        low, high = number(100 * found.rate[order[-1]]), number(100 * found.rate[order[0]])
+        much = f"{high} %" if low == high else f"{low} to {high} %, not told apart"
+        said = f"all {len(order)} that may be first have {much}"
+    text = f"success of {_sample(part)}: {said}{_pace(part, setting, first, found)}."
+    contenders = tuple(every[k] for k in order)
+    return Leaders(contenders, alone, found, Finding(question, text))
+
+
+def _with_shares(of: Sequence[tuple[Contender, float]], names: Names) -> str:
+    """Name formulations with their rates, those of the same rate together."""
     groups: dict[str, list[Contender]] = {}
-    for k in order:
-        groups.setdefault(number(100 * found.rate[k]), []).append(all_names[k])
-    said = [f"{names.of(group)} with {share} %" for share, group in groups.items()]
-    text = f"success of {_sample(part)}: {'; '.join(said)}"
-    if len(order) > 1:
-        text += ", not told apart"
-    text += _next(found, first, candidates, names) + _pace(part, setting, first, found)
-    contenders = tuple(all_names[k] for k in order)
-    return Leaders(contenders, found, Finding(f"First where {IN_WORDS[setting]}", f"{text}."))
+    for contender, rate in of:
+        groups.setdefault(number(100 * rate), []).append(contender)
+    return "; ".join(f"{names.of(group)} with {share} %" for share, group in groups.items())
 
 
 def _sample(part: pd.DataFrame) -> str:
@@ -100,35 +125,32 @@ def _sample(part: pd.DataFrame) -> str:
     )
 
 
-def _next(found: Rates, first: Mask, candidates: set[Contender], names: Names) -> str:
-    """Name the best of the candidates that can be told apart from the first."""
-    all_names = list(found.contenders.itertuples(index=False, name=None))
-    others = [
-        k
-        for k, name in enumerate(all_names)
-        if name in candidates and not found.best[k] and found.upper[k] < 0
-    ]
-    if not others or not first.any():
+def _next(found: Rates, others: Mask, every: Sequence[Contender], names: Names) -> str:
+    """Name the best of the others that can be told apart from the first."""
+    apart = np.flatnonzero(others & (found.upper < 0))
+    if not len(apart):
         return ""
-    k = max(others, key=lambda k: float(found.rate[k]))
-    return (
-        f"; next is {names.of([all_names[k]])} with {number(100 * found.rate[k])} %, "
-        f"{number(-100 * found.upper[k])} to {number(-100 * found.lower[k])} points less"
-    )
+    k = apart[found.rate[apart].argmax()]
+    low, high = number(-100 * found.upper[k]), number(-100 * found.lower[k])
+    points = low if low == high else f"{low} to {high}"
+    share = number(100 * found.rate[k])
+    return f"; next is {names.of([every[k]])} with {share} %, {points} points less"
 
 
 def _pace(part: pd.DataFrame, setting: Setting, first: Mask, found: Rates) -> str:
-    """Say how much time they take where the path waits."""
+    """Say how much time those who are first take where the path waits."""
     if setting != "path":
         return ""
     done = part["slow_down"].where(succeeded(part)).to_numpy(dtype=float)
-    values = found.layout.fill(done)[:, np.flatnonzero(first)]
-    if np.isnan(values).all():
+    columns = found.layout.fill(done)[:, np.flatnonzero(first)].T
+    medians = [float(np.nanmedian(column)) for column in columns if not np.isnan(column).all()]
+    if not medians:
         return ""
-    medians = np.nanmedian(values, axis=0)
-    low, high = number(float(medians.min())), number(float(medians.max()))
-    much = low if low == high else f"{low} to {high}"
-    return f". They take {much} times the nominal duration (medians of what they did)"
+    low, high = number(min(medians)), number(max(medians))
+    much = "" if high == "1" else f"{high} times "
+    if low != high:
+        much = f"{low} to {high} times "
+    return f". Median time of what was done: {much}the nominal duration"
 
 
 def most_accurate(part: pd.DataFrame, leading: Leaders, names: Names) -> Finding | None:
@@ -136,12 +158,13 @@ def most_accurate(part: pd.DataFrame, leading: Leaders, names: Names) -> Finding
 
     None where they are alike, or where there is one alone.
     """
-    if len(leading.contenders) < 2 or part["judged_by_path"].eq(0).all():
+    if len(leading.contenders) < 2:
         return None
     found = leading.found
-    all_names = list(found.contenders.itertuples(index=False, name=None))
-    columns = [all_names.index(name) for name in leading.contenders]
-    away = part["contour_error_6d_max_m"].clip(lower=SMALLEST_DISTANCE_M).where(succeeded(part))
+    every = list(found.contenders.itertuples(index=False, name=None))
+    columns = [every.index(name) for name in leading.contenders]
+    away = part["contour_error_6d_max_m"].clip(lower=SMALLEST_DISTANCE_M)
+    away = away.where(succeeded(part) & part["judged_by_path"].eq(1))
     matrix = found.layout.fill(np.log(away.to_numpy(dtype=float)))[:, columns]
     common = ~np.isnan(matrix).any(axis=1)
     if common.sum() < 2:
@@ -149,19 +172,19 @@ def most_accurate(part: pd.DataFrame, leading: Leaders, names: Names) -> Finding
     matrix[~common] = np.nan
     best = int(np.nanmean(matrix, axis=0).argmin())
     means, lower, _ = paired_means(matrix - matrix[:, [best]], found)
-    together = [k for k in range(len(columns)) if not lower[k] > 0]
-    behind = [k for k in range(len(columns)) if lower[k] > 0]
-    if not behind:
+    behind = np.flatnonzero((lower > 0) & (means > np.log(NEARER)))
+    if not len(behind):
         return None
-    second = min(behind, key=lambda k: float(means[k]))
-    value = float(np.exp(np.nanmedian(matrix[:, best])))
+    second = behind[means[behind].argmin()]
+    together = np.flatnonzero(means < means[second])
+    medians = np.exp(np.nanmedian(matrix[:, together], axis=0))
+    low, high = number(1e3 * float(medians.min())), number(1e3 * float(medians.max()))
     text = (
         f"of these {names.of([leading.contenders[k] for k in together])}, "
-        f"{millimetres(value)} from the path at most (median of "
+        f"{low if low == high else f'{low} to {high}'} mm from the path at most (medians of "
         f"{several(int(common.sum()), 'case')} that all of them did; angles count with 0.2 m); "
-        f"next is "
-        f"{names.of([leading.contenders[second]])}, {number(float(np.exp(means[second])))} times "
-        "as far"
+        f"next is {names.of([leading.contenders[second]])}, "
+        f"{number(float(np.exp(means[second])))} times as far (geometric mean)"
     )
     return Finding("Most accurate", f"{text}.")
 
@@ -200,41 +223,45 @@ def unanswered(rows: pd.DataFrame, names: Names) -> Finding | None:
 def first_most_often(
     firsts: Sequence[tuple[Setting, tuple[Contender, ...]]], names: Names
 ) -> list[Finding]:
-    """Say for each setting who is first, alone or tied, in the most situations."""
+    """Say for each setting who is first, alone or tied, in the most situations.
+
+    Args:
+        firsts: who is first in each situation in which somebody stands out.
+        names: how they are called.
+    """
     found = []
     for setting, where in IN_WORDS.items():
         of_setting = [contenders for each, contenders in firsts if each == setting]
-        counts: dict[Contender, int] = {}
-        for contenders in of_setting:
-            for contender in contenders:
-                counts[contender] = counts.get(contender, 0) + 1
-        if not counts:
+        counts = Counter(contender for contenders in of_setting for contender in contenders)
+        if len(of_setting) < 2:
             continue
         most = max(counts.values())
         who = [contender for contender, count in counts.items() if count == most]
-        of = several(len(of_setting), "situation")
-        text = f"{names.of(who)}, alone or tied, in {most} of {of} in which somebody can be named"
+        text = (
+            f"{names.of(who)}, alone or tied, in {most} of the {len(of_setting)} situations in "
+            "which somebody stands out"
+        )
         found.append(Finding(f"First most often where {where}", f"{text}."))
     return found
 
 
-def fastest(rows: pd.DataFrame, among: Sequence[Contender], names: Names) -> Finding | None:
-    """Say whose call takes the least time of those who are first somewhere; None without times.
+def fastest(rows: pd.DataFrame, among: Collection[Contender], names: Names) -> Finding | None:
+    """Say whose call takes the least time of those that may be first; None of fewer than two.
 
     Args:
         rows: trials, of any plant.
-        among: who is first in a situation.
+        among: who may be first.
         names: how they are called.
     """
     cells = rows.drop_duplicates([*CONTENDER, "scenario"])
     cells = cells[cells["formulation_time_median_us"].notna()]
     keys = pd.MultiIndex.from_frame(cells[CONTENDER])
-    cells = cells[keys.isin(list(among))]
-    if cells.empty:
-        return None
+    cells = cells[keys.isin(list(among))] if among else cells[:0]
     timed = cells.groupby(CONTENDER, sort=False)["scenario"].nunique()
     medians = cells.groupby(CONTENDER, sort=False)["formulation_time_median_us"].median()
     medians = medians[timed.eq(timed.max())].sort_values(kind="stable")
+    if len(medians) < 2:
+        return None
     alike = list(medians[medians <= (1 + DRIFT) * medians.iloc[0]].index)
     text = f"{names.of(alike)}, {number(medians.iloc[0] / 1e3)} ms a call"
     if len(alike) > 1:
@@ -245,5 +272,5 @@ def fastest(rows: pd.DataFrame, among: Sequence[Contender], names: Names) -> Fin
     text += f" (medians over {several(int(timed.max()), 'scenario')})"
     unstable = int(cells["timing_stability"].ne(STABLE).sum())
     if unstable:
-        text += f"; {unstable} of {len(cells)} timed cells are not stable"
-    return Finding("Fastest of those who are first somewhere", f"{text}.")
+        text += f"; of {len(cells)} timed cells {unstable} cannot be trusted"
+    return Finding("Fastest of those that may be first", f"{text}.")

@@ -16,11 +16,15 @@ from dikbench.report.sentences.findings import (
     most_accurate,
     unanswered,
 )
-from dikbench.report.sentences.words import Contender, Names, several
+from dikbench.report.sentences.words import Names, several
 from dikbench.scenario.oracle import ORACLES
 from dikbench.scenario.situation import Situation
-from dikbench.statistics.first_places import dependable
-from dikbench.statistics.success import Setting, with_facts
+from dikbench.statistics.first_places import (
+    MOST_BROKEN_SHARE,
+    SMALLEST_SHARE_OF_BEST,
+    dependable,
+)
+from dikbench.statistics.success import Contender, Setting, with_facts
 
 
 @dataclass(frozen=True)
@@ -47,17 +51,14 @@ class Summary:
     Attributes:
         basis: of which trials it speaks.
         short: findings over all situations.
-        chapters: findings per situation.
+        chapters: findings per situation, where there are any.
+        scenarios: how many scenarios it speaks of.
     """
 
     basis: str
     short: tuple[Finding, ...] = ()
     chapters: tuple[Chapter, ...] = ()
-
-    @property
-    def scenarios(self) -> int:
-        """How many scenarios it speaks of."""
-        return sum(len(chapter.scenarios) for chapter in self.chapters)
+    scenarios: int = 0
 
 
 def summarise(trials: pd.DataFrame) -> Summary:
@@ -71,8 +72,8 @@ def summarise(trials: pd.DataFrame) -> Summary:
         return Summary("No formulation was run.")
     if trials["feasible"].fillna("").eq("").all():
         return Summary(
-            "These results are of a version without outcomes, so that nothing is concluded from "
-            "them: `dikbench recompute` adds outcomes where traces were kept."
+            "These results are without outcomes, as an older version wrote them, so that nothing "
+            "is concluded from them; `dikbench recompute` adds outcomes where traces were kept."
         )
     names = Names(contenders)
     of_setting = {setting: judged_rows(trials, setting) for setting in SETTINGS}
@@ -90,20 +91,23 @@ def summarise(trials: pd.DataFrame) -> Summary:
             leading = leaders(part, setting, candidates[setting], names) if len(part) else None
             if leading is None:
                 continue
-            firsts.append((setting, leading.contenders))
+            if leading.alone:
+                firsts.append((setting, leading.contenders))
             findings.append(leading.finding)
             if setting == "path" and (closest := most_accurate(part, leading, names)):
                 findings.append(closest)
-        if scenarios:
+        if findings:
             chapters.append(Chapter(situation, definition, tuple(scenarios), tuple(findings)))
-    among = list(dict.fromkeys(contender for _, who in firsts for contender in who))
+    among = set().union(*candidates.values())
     short = (
         *first_most_often(firsts, names),
         fastest(contenders, among, names),
         broke_off(contenders, names),
         unanswered(contenders, names),
     )
-    return Summary(_basis(trials), tuple(each for each in short if each), tuple(chapters))
+    counted = pd.concat([rows["scenario"] for rows in of_setting.values()]).nunique()
+    said = tuple(each for each in short if each)
+    return Summary(_basis(trials), said, tuple(chapters), int(counted))
 
 
 def _basis(trials: pd.DataFrame) -> str:
@@ -113,7 +117,9 @@ def _basis(trials: pd.DataFrame) -> str:
     known = int(cases["feasible"].isin(["time", "path"]).sum())
     return (
         f"Success on the {plant} plant in the {known} of {several(len(cases), 'case')} (a scenario "
-        "with a seed) that a known motion can do. First is named who cannot be told apart from the "
-        "best (95 % paired intervals), keeps the limits that it is told of in all situations, and "
-        "is not slower than another of them; of the rest nothing is said."
+        "with a seed) that a known motion can do. Who is stopped by a limit that it is told of, by "
+        f"a collision or a failure in more than {100 * MOST_BROKEN_SHARE:g} % of them, or succeeds "
+        f"overall in at most {100 * SMALLEST_SHARE_OF_BEST:g} % of what the best of the others "
+        "does, may not be first; first is who of the rest cannot be told apart from the best "
+        "(95 % paired intervals) and is not slower than another of them."
     )

@@ -8,8 +8,7 @@ from typing import Final
 
 import pandas as pd
 
-Contender = tuple[str, str]
-"""A formulation and its solver."""
+from dikbench.statistics.success import Contender
 
 FEW: Final = 6
 """More names than this are counted, not listed."""
@@ -28,16 +27,6 @@ def _far(value: float) -> str:
     return f"{value:.2e}" if abs(value) < 1e-4 or abs(value) >= 1e6 else f"{value:.0f}"
 
 
-def millimetres(metres: float) -> str:
-    """A length."""
-    return f"{number(1e3 * metres)} mm"
-
-
-def degrees(radians: float) -> str:
-    """An angle."""
-    return f"{number(math.degrees(radians))} deg"
-
-
 def several(count: int, what: str) -> str:
     """A count and its noun."""
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
@@ -45,7 +34,7 @@ def several(count: int, what: str) -> str:
 
 def listed(names: Sequence[str], most: int | None = FEW) -> str:
     """Names in a sentence: `a`, `b` and 5 more."""
-    shown = list(names if most is None or len(names) <= most + 1 else names[:most])
+    shown = list(names if most is None else names[:most])
     if len(shown) < len(names):
         return f"{', '.join(shown)} and {len(names) - len(shown)} more"
     return " and ".join([", ".join(shown[:-1]), shown[-1]]) if len(shown) > 1 else "".join(shown)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import isnan
 from textwrap import wrap
 
-from dikbench.report.tables.table import Block, Column, Table, TableCell, TableRow, shown
+from dikbench.report.tables.table import NOT_TOLD, Block, Column, Table, TableCell, TableRow, shown
 
 WIDTH = 120
 """Characters to a line."""
@@ -20,8 +20,14 @@ ROWS = 24
 NAME = 40
 """Characters of a formulation with its solver."""
 
+UNSEEN = "unseen"
+"""Stands for `NOT_TOLD`."""
+
 HEADING = 12
-"""Characters to a line of a heading, unless a word is longer."""
+"""Characters to a line of a heading, unless a word is longer ..."""
+
+NARROW = 8
+"""... and of one above whole numbers."""
 
 
 def to_text(table: Table) -> str:
@@ -32,7 +38,7 @@ def to_text(table: Table) -> str:
     """
     parts = [table.title, *(_block(table, block) for block in table.overall[:BLOCKS])]
     if not table.blocks:
-        parts.append("Nothing was measured.")
+        parts.append(table.empty)
     left = len(table.overall) - BLOCKS
     if left > 0:
         parts.append(f"Other plants and reference modes ({left}): tables/{table.name}.md")
@@ -44,9 +50,16 @@ def _block(table: Table, block: Block) -> str:
     columns = [["formulation", *(_name(row) for row in top)]]
     for place in table.shown:
         column = table.columns[place]
-        columns.append([column.heading, *(_text(column, row.cells[place]) for row in top)])
+        heading = wrap(
+            column.short or column.heading,
+            NARROW if column.whole else HEADING,
+            break_long_words=False,
+        )
+        columns.append(["\n".join(heading), *(_text(column, row.cells[place]) for row in top)])
     lines = [block.setting] if block.setting else []
     lines += _fitting(columns)
+    if any(cell.text == NOT_TOLD for row in top for cell in row.cells):
+        lines.append(f"{UNSEEN}: {NOT_TOLD}")
     if len(block.rows) > ROWS:
         lines.append(f"and {len(block.rows) - ROWS} more: tables/{table.name}.md")
     return "\n".join(lines)
@@ -54,7 +67,7 @@ def _block(table: Table, block: Block) -> str:
 
 def _fitting(columns: Sequence[Sequence[str]]) -> list[str]:
     """Lines of the first columns that fit, under headings of several lines."""
-    headings = [wrap(heading, HEADING, break_long_words=False) for heading, *_ in columns]
+    headings = [heading.split("\n") for heading, *_ in columns]
     height = max(map(len, headings))
     lines = [""] * (height + len(columns[0]) - 1)
     for place, (heading, column) in enumerate(zip(headings, columns, strict=True)):
@@ -79,9 +92,10 @@ def _name(row: TableRow) -> str:
 
 def _text(column: Column, cell: TableCell) -> str:
     if cell.text:
-        return f"{cell.text} "
+        return f"{UNSEEN if cell.text == NOT_TOLD else cell.text} "
     if isnan(cell.value):
         return ""
     if column.count:
         return f"{cell.value:.0f} "
-    return shown(cell.value) + "?" * cell.unstable + ("*" if cell.best else " ")
+    number = f"{cell.value:.0f}" if column.whole else shown(cell.value)
+    return number + "?" * cell.unstable + ("*" if cell.best else " ")

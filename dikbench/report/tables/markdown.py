@@ -10,8 +10,6 @@ import pandas as pd
 
 from dikbench.report.tables.table import ALL, Block, Column, Table, TableCell, shown
 
-NOTHING = "Nothing was measured."
-
 _ENTITIES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;"})
 _SPECIAL = re.compile(
     r"[\\`*|~$]"  # anywhere
@@ -71,7 +69,7 @@ def to_markdown(table: Table) -> str:
         parts = [block for block in table.blocks if block.family == family]
         lines += [markdown_blocks(table, parts), ""]
     if not table.blocks:
-        lines += [NOTHING, ""]
+        lines += [table.empty, ""]
     return "\n".join(lines)
 
 
@@ -96,7 +94,7 @@ def markdown_blocks(table: Table, blocks: Iterable[Block]) -> str:
         if block.setting:
             parts.append(f"{escape(block.setting)}:")
         parts.append(aligned(header, rows, right))
-    return "\n\n".join(parts) or NOTHING
+    return "\n\n".join(parts) or table.empty
 
 
 def _cell(column: Column, cell: TableCell) -> str:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import nan
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 import pandas as pd
 
+from dikbench.arrays import Mask
 from dikbench.report.selection.judged import (
     CONSTRAINED,
     DEFINITIONS,
@@ -18,7 +20,15 @@ from dikbench.report.selection.judged import (
     judged_rows,
 )
 from dikbench.report.sentences.words import several
-from dikbench.report.tables.table import ALL, Block, Column, Table, TableCell, TableRow
+from dikbench.report.tables.table import (
+    ALL,
+    NOT_TOLD,
+    Block,
+    Column,
+    Table,
+    TableCell,
+    TableRow,
+)
 from dikbench.scenario.situation import Situation
 from dikbench.statistics.first_places import (
     FASTER,
@@ -26,10 +36,21 @@ from dikbench.statistics.first_places import (
     SMALLEST_SHARE_OF_BEST,
     dependable,
     first_places,
+    told_of,
 )
-from dikbench.statistics.success import Rates, Setting, rates, succeeded, with_facts
+from dikbench.statistics.success import Contender, Rates, Setting, rates, succeeded, with_facts
 
-NOT_TOLD: Final = "does not see them"
+SHORT: Final[Mapping[Situation, str]] = MappingProxyType(
+    {
+        "near singularities": "near sing.",
+        "at joint limits": "joint limits",
+        "beyond joint speed": "joint speed",
+        CONSTRAINED: "obst., torque",
+    }
+)
+"""Situations in short headings, where they are shorter."""
+
+NO_OUTCOMES: Final = "Nothing can be said of success: no trial has an outcome that counts."
 
 TITLE: Final = "Success: share of the trials in which the robot did its job [%]"
 
@@ -55,35 +76,32 @@ def success_table(trials: pd.DataFrame) -> Table:
         Block(ALL, plant, setting, _rows(rows, situations, kinematic=CONSTRAINED in present))
         for setting, rows in found.items()
     ]
-    return Table("success", TITLE, columns, tuple(blocks), tuple(_notes(trials)))
+    return Table("success", TITLE, columns, tuple(blocks), tuple(_notes(trials)), NO_OUTCOMES)
 
 
 def _rows(
     rows: pd.DataFrame, situations: Sequence[Situation], *, kinematic: bool
 ) -> tuple[TableRow, ...]:
     """Make the rows of a setting, one per formulation and solver."""
-    candidates, overall = dependable(rows), rates(rows, succeeded(rows))
-    names = list(overall.contenders.itertuples(index=False, name=None))
-    cells: dict[tuple[str, str], list[TableCell]] = {name: [] for name in names}
-    unseen = set(
-        rows[rows["sees_constraints"].eq(0)][["formulation", "solver"]].itertuples(
-            index=False, name=None
-        )
-    )
+    candidates = dependable(rows)
+    overall = rates(rows, succeeded(rows), candidates)
+    names: list[Contender] = list(overall.contenders.itertuples(index=False, name=None))
+    cells: dict[Contender, list[TableCell]] = {name: [] for name in names}
+    told = told_of(rows, names)
     for situation in situations:
         part = rows[rows["situation"].eq(situation)]
         if part.empty:
             for row in cells.values():
                 row.append(TableCell(nan))
             continue
-        found = rates(part, succeeded(part))
-        first = first_places(part, found, candidates)
-        told = {name: situation != CONSTRAINED or name not in unseen for name in names}
-        _append(cells, found, first, told)
+        found = rates(part, succeeded(part), told_of(part, candidates))
+        untold = () if situation != CONSTRAINED else [name for name in names if name not in told]
+        _append(cells, found, first_places(part, found), untold)
+    nobody = np.zeros(len(names), dtype=bool)
     if kinematic:
         part = rows[~rows["situation"].eq(CONSTRAINED)]
-        _append(cells, rates(part, succeeded(part)), None, {})
-    _append(cells, overall, None, {})
+        _append(cells, rates(part, succeeded(part), candidates), nobody)
+    _append(cells, overall, nobody)
     counts = dict(zip(names, overall.trials, strict=True))
     return tuple(
         TableRow(*name, (*row, TableCell(float(counts[name])))) for name, row in cells.items()
@@ -91,10 +109,10 @@ def _rows(
 
 
 def _append(
-    cells: dict[tuple[str, str], list[TableCell]],
+    cells: dict[Contender, list[TableCell]],
     found: Rates,
-    first: Sequence[bool] | np.ndarray | None,
-    told: dict[tuple[str, str], bool],
+    first: Mask,
+    untold: Sequence[Contender] = (),
 ) -> None:
     """Append a cell per formulation: its rate, and the interval of the difference to the best."""
     of = {
@@ -111,8 +129,8 @@ def _append(
                 100 * float(found.rate[k]),
                 100 * float(found.lower[k]),
                 100 * float(found.upper[k]),
-                best=first is not None and bool(first[k]),
-                text="" if told.get(name, True) else NOT_TOLD,
+                best=bool(first[k]),
+                text=NOT_TOLD if name in untold else "",
             )
         )
 
@@ -122,16 +140,16 @@ def _column(situation: Situation, found: dict[Setting, pd.DataFrame]) -> Column:
     return Column(
         key=f"{situation.replace(' ', '_')}_percent",
         heading=situation,
-        definition=f"{_sample(parts)}",
+        definition=_sample(parts),
         better="high",
         interval=True,
-        difference=True,
+        short=SHORT.get(situation, ""),
+        whole=True,
     )
 
 
 def _overall(what: str, found: dict[Setting, pd.DataFrame]) -> Column:
-    parts = found
-    text = "all situations"
+    parts, text = found, "all situations"
     if what == "kinematic":
         parts = {key: rows[~rows["situation"].eq(CONSTRAINED)] for key, rows in found.items()}
         text = "all situations but obstacles and torques"
@@ -141,7 +159,8 @@ def _overall(what: str, found: dict[Setting, pd.DataFrame]) -> Column:
         definition=f"{text}, families weighed equally: {_sample(parts)}",
         better="high",
         interval=True,
-        difference=True,
+        short="kinem." if what == "kinematic" else "",
+        whole=True,
     )
 
 
@@ -169,12 +188,14 @@ def _notes(trials: pd.DataFrame) -> list[str]:
         "of its path, does all of it in its order and, by the clock, is not late; where only a "
         "path that waits can be followed, the clock asks that the robot gives way and comes back.",
         "Where the path may wait, the reference waits for the robot; targets at rest are in both.",
-        "A rate is a mean over families of means over robots of means over scenarios and seeds; in "
-        "brackets the 95 % bootstrap interval of the paired difference to the best, in points.",
-        "A star: not told apart from the best here (ties are all starred), not slower than another "
-        f"of them by more than {FASTER:g}, successful overall in more than "
-        f"{SMALLEST_SHARE_OF_BEST:.0%} of what the best is, and stopped by a limit or a collision "
-        f"that it is told of in at most {MOST_BROKEN_SHARE:.0%} of all trials.",
+        "A rate is a mean over families of means over robots of means over scenarios and seeds.",
+        "Who may be starred is stopped by a limit that it is told of, a collision or a failure in "
+        f"at most {100 * MOST_BROKEN_SHARE:g} % of all trials, and successful overall in more than "
+        f"{100 * SMALLEST_SHARE_OF_BEST:g} % of what the best of those is. A star: not told apart "
+        "from the best of those here (ties are all starred), and not slower than another of them "
+        f"by a ratio of more than {FASTER:g}.",
+        "In brackets stands the 95 % interval of the difference to the best of those that may be "
+        "starred, in points, from a bootstrap of paired trials; none where it has no width.",
     ]
     if len(left_out):
         said = {"no": "that nothing can do, by proof", "unknown": "of which no motion is known"}

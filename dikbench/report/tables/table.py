@@ -13,6 +13,9 @@ ALL = "all"
 DIGITS = 3
 """Significant digits that are shown; what agrees in them is equally good."""
 
+NOT_TOLD = "does not see them"
+"""Stands in place of a number of a formulation that is not told of obstacles or torques."""
+
 ROUNDING = 1e-9
 """What is smaller than this is rounding, and shown as 0 (CSV keeps it)."""
 
@@ -37,8 +40,9 @@ class Column:
         better: which direction is better; None where neither is (a count of trials).
         interval: whether its cells carry an interval.
         count: whether its cells are whole numbers.
-        difference: whether the interval is of the difference to the best, not of the number.
         shown: whether it is shown, or stands in the CSV alone.
+        short: its heading where there is little room; empty: `heading`.
+        whole: whether it is rounded to whole numbers where there is little room.
     """
 
     key: str
@@ -47,8 +51,9 @@ class Column:
     better: Literal["low", "high"] | None = None
     interval: bool = False
     count: bool = False
-    difference: bool = False
     shown: bool = True
+    short: str = ""
+    whole: bool = False
 
 
 @dataclass(frozen=True)
@@ -74,9 +79,9 @@ class TableCell:
 
     @property
     def has_interval(self) -> bool:
-        """Whether there is an interval that, as it is shown, is more than the value itself."""
+        """Whether there is an interval that, as it is shown, is more than a number."""
         bounds = (self.lower, self.upper)
-        return not any(map(isnan, bounds)) and {*map(shown, bounds)} != {shown(self.value)}
+        return not any(map(isnan, bounds)) and len({*map(shown, bounds)}) > 1
 
 
 @dataclass(frozen=True)
@@ -129,6 +134,7 @@ class Table:
         columns: what the cells of a row are, failures first.
         blocks: its parts, each to be headed by its family, plant and reference mode.
         notes: sentences that belong under it: how the numbers were taken.
+        empty: what is said where it has no blocks.
     """
 
     name: str
@@ -136,6 +142,7 @@ class Table:
     columns: tuple[Column, ...]
     blocks: tuple[Block, ...]
     notes: Sequence[str]
+    empty: str = "Nothing was measured."
 
     @property
     def shown(self) -> tuple[int, ...]:

@@ -75,7 +75,7 @@ def test_help_does_not_import_anything_heavy() -> None:
 
 MALFORMED = [
     (("run", "nosuch"), ("nosuch", "quick")),
-    (("run", "--formulation", "dls[damping=many]"), ("damping", "float")),
+    (("run", "--formulation", "dls[damping=many]"), ("damping", "a number, finite and")),
     (("run", "--formulation", "dls[dampin=1]"), ("dampin", "valid: damping")),
     (("run", "--formulation", "nofile.py:Formulation"), ("nofile.py",)),
     (("run", "--solver", "osqp[eps=1]"), ("eps", "eps_abs")),
@@ -86,7 +86,7 @@ MALFORMED = [
     (("run", "train", "--seed", "0"), ("seed 0", "1 to 99")),
     (("show", "near-miss", "--figure", "a.gif"), ("a.gif", ".svg, .png, .pdf")),
     (("show", "near-miss", "--figure", "no/such/a.png"), ("no/such/a.png", "No such file")),
-    (("show", "dls", "--figure", "a.png"), ("dls", "near-miss")),
+    (("show", "dls", "--figure", "a.png"), ("dls", "dikbench list scenarios")),
     (("run", "--scenario", "reach[duration=1e15]"), ("steps", "valid")),
     (("run", "--plant", "perfect"), ("perfect", "ideal")),
     (("run", "--reference", "space"), ("space", "path")),
@@ -94,15 +94,35 @@ MALFORMED = [
     (("run", "--out", "afile/inside", "--formulation", "dls"), ("afile/inside",)),
     (("recompute", "nowhere"), ("no results", "nowhere")),
     (("list", "laws"), ("laws", "formulations")),
-    (("show", "nothing"), ("nothing", "valid")),
+    (("show", "nothing"), ("nothing", "valid", "dikbench list")),
+    (("show", "dls[dampin=1]"), ("dampin", "valid: damping")),
+    (("show", "dls[damping=-1]"), ("damping=-1.0", "finite and at least 0")),
+    (("show", "osqp[eps=1]"), ("eps", "eps_abs")),
+    (("show", "saturating[delay=x]"), ("delay='x'", "a whole number, 0 to 1000 [steps]")),
+    (("show", "panda[x=1]"), ("panda has no parameters", "valid in brackets")),
+    (("show", "lag_max_s[x=1]"), ("lag_max_s has no parameters",)),
+    (("show", "nofile.py:Family"), ("error: file not found: nofile.py",)),
+    (("show", "bad.py"), ("bad.py names a file without a class; valid: bad.py:Law, bad.py:Way",)),
+    (("check", "bad.py"), ("valid: bad.py:Law",)),
+    (("run", "--scenario", "bad.py"), ("bad.py:Way",)),
+    (("run", "--formulation", "bad.py"), ("bad.py:Law",)),
+    (("run", "--formulation", "bad.py:Low"), ("'Low'", "did you mean 'Law'", "valid: Law, Way")),
+    (("run", "bad.toml"), ("study bad.toml: cells[0].formulations: ", "damping='x'", "a number")),
     (("--plnt",), ("--plnt",)),
 ]
 SHOWN = {
     "qp": "min_v",
     "near-miss[miss=0.05]": "required speed over limit",
-    "near-miss": "miss = 0.02: 0 or 0.001 to 0.2 [m; rad]  (instances: 0.002 to 0.05, logarithmic)",
-    "dls": "damping = 0.05: finite and at least 0  (tuned: 0.001 to 0.3, logarithmic)",
+    "near-miss": (
+        "miss = 0.02: a number, 0 or 0.001 to 0.2 [m; rad]  (instances: 0.002 to 0.05, logarithmic)"
+    ),
+    "dls": "damping = 0.05: a number, finite and at least 0  (tuned: 0.001 to 0.3, logarithmic)",
+    "dls[damping=0.2]": "damping = 0.2 (default: 0.05): a number, finite and at least 0",
     "osqp": "eps_abs",
+    "osqp[eps_abs=1e-6]": "selected: eps_abs=1e-6",
+    "ideal[delay=2]": "delay = 2 (default: 0): a whole number, 0 to 1000 [steps]",
+    "saturating": "Clips each joint",
+    "oracle": "the exact joint motion",
     "panda": "panda_hand_tcp",
     "direction_error_max_rad": "unit: rad",
     "quick": "[[cells]]",
@@ -134,6 +154,27 @@ for stream, kept in enumerate(streams, start=1):
 that ends in an error is taken by imports."""
 
 
+CLASSES = """
+from dataclasses import dataclass
+from scenarios.reach import Reach
+
+@dataclass(frozen=True)
+class Law:
+    def velocity(self, problem, solve):
+        return problem.q
+
+@dataclass(frozen=True, kw_only=True)
+class Way(Reach):
+    pass
+"""
+SWEEP = """
+description = "a wrong value in a list"
+scenarios = ["reach"]
+[[cells]]
+formulations = ["dls[damping=0.1|x|0.2]"]
+"""
+
+
 def run_all(
     folder: Path, commands: Sequence[Sequence[str]], path: Path | None = None
 ) -> list[Path]:
@@ -143,6 +184,8 @@ def run_all(
         (each / "cwd").mkdir(parents=True)
         (each / "cwd" / "bad.urdf").write_text("<robot name='x'>")
         (each / "cwd" / "afile").touch()
+        (each / "cwd" / "bad.py").write_text(CLASSES)
+        (each / "cwd" / "bad.toml").write_text(SWEEP)
     command = [sys.executable, "-c", ONE_AFTER_THE_OTHER, json.dumps(commands)]
     environment = os.environ if path is None else {**os.environ, "PYTHONPATH": str(path)}
     subprocess.run(command, cwd=folder, env=environment, check=True, timeout=600)
@@ -166,7 +209,14 @@ def test_malformed_input_is_one_line_and_exit_code_two(refused: list[Path], numb
     assert said.startswith("error: ")
     for part in expected:
         assert part in said
-    assert sorted(path.name for path in (folder / "cwd").rglob("*")) == ["afile", "bad.urdf"]
+    assert len(said) < 350
+    written = {path.name for path in (folder / "cwd").rglob("*")} - {"__pycache__"}
+    assert {name for name in written if not name.endswith(".pyc")} == {
+        "afile",
+        "bad.py",
+        "bad.toml",
+        "bad.urdf",
+    }
 
 
 def test_a_failed_command_touches_no_earlier_results(results: Path, tmp_path: Path) -> None:
@@ -225,7 +275,7 @@ def test_a_law_and_a_family_in_files_run_without_packaging(
     )
     shown = in_process("show", "unpackaged_reach.py:Short")
     assert shown.exit_code == 0, shown.output
-    assert "distance = 0.05: 0.01 to 0.3 [m]" in shown.output
+    assert "distance = 0.05: a number, 0.01 to 0.3 [m]" in shown.output
     law = "unpackaged_law.py:MyLaw"
     done = in_process(
         "run", "--formulation", law, "--formulation", f"{law}[gain=2]",

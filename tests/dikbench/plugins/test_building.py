@@ -96,12 +96,15 @@ def test_parameters_arrive_in_their_types() -> None:
     [
         ("dsl", ["unknown formulation 'dsl'", "did you mean 'dls'?", "valid:", "path/to/file.py"]),
         ("dls[dampign=1]", ["parameter of formulation dls 'dampign'", "did you mean 'damping'?"]),
-        ("dls[damping=much]", ["formulation dls: damping='much' is not valid", "float"]),
+        (
+            "dls[damping=much]",
+            ["formulation dls: damping='much' is not valid", "valid: a number, finite"],
+        ),
         ("dls[damping=-1]", ["dls: damping=-1.0 must be finite and at least 0"]),
         ("dls[damping=nan]", ["dls: damping=nan must be finite and at least 0"]),
         ("pinv[after=cilp]", ["pinv: after='cilp' is not valid", "valid: none, clip, scale"]),
         ("qp[braking=x]", ["valid: one-step, gain, sqrt, viable"]),
-        ("qp[log_derivative=maybe]", ["log_derivative='maybe' is not valid", "bool"]),
+        ("qp[log_derivative=maybe]", ["log_derivative='maybe' is not valid", "true or false"]),
     ],
 )
 def test_wrong_formulations_name_what_would_be_valid(text: str, parts: list[str]) -> None:
@@ -114,7 +117,7 @@ def test_wrong_formulations_name_what_would_be_valid(text: str, parts: list[str]
 @pytest.mark.parametrize(
     ("text", "parts"),
     [
-        ("near-mis", ["unknown scenario 'near-mis'", "did you mean 'near-miss'?", "speed-sweep"]),
+        ("near-mis", ["unknown scenario 'near-mis'", "did you mean 'near-miss'?", "valid:"]),
         ("near-miss[mis=1]", ["parameter of scenario near-miss 'mis'", "did you mean 'miss'?"]),
         ("near-miss[miss=far]", ["near-miss: miss='far' is not valid"]),
         ("near-miss[robot=iiwa]", ["unknown robot 'iiwa'", "panda", "or give the path of a .urdf"]),
@@ -158,9 +161,9 @@ def test_a_law_from_a_file(law_file: Path) -> None:
         ("{file}:Mine[side=up]", ["side='up' is not valid; valid: left, right"]),
         ("{file}:Mine[size=1]", ["'size'", "valid: careful, count, gain, side"]),
         ("{file}:", ["unknown class ''"]),
-        ("{folder}/other.py:Mine", ["formulation file not found: {folder}/other.py"]),
+        ("{folder}/other.py:Mine", ["file not found: {folder}/other.py; valid: path/to/"]),
         ("{folder}:Mine", ["unknown formulation"]),
-        ("{long}.py:Mine", ["formulation file not found"]),
+        ("{long}.py:Mine", ["file not found"]),
     ],
 )
 def test_errors_of_a_law_in_a_file(law_file: Path, selector: str, parts: list[str]) -> None:
@@ -184,7 +187,7 @@ def test_a_file_that_cannot_be_imported_is_named(tmp_path: Path, text: str, reas
     path = tmp_path / "broken.py"
     path.write_text(text)
     message = error_of(make_formulation, f"{path}:Law")
-    assert message.startswith(f"formulation file {path} cannot be imported: {reason}")
+    assert message.startswith(f"{path} cannot be imported: {reason}")
 
 
 def test_a_parameter_keeps_its_type_where_another_cannot_be_resolved(tmp_path: Path) -> None:

@@ -168,7 +168,7 @@ def test_a_plugin_that_cannot_be_imported_is_named(install: Install) -> None:
 
     install("dikbench.scenarios", theirs=load)
     message = error_of(make_scenario, "reach")
-    assert message == (
+    assert message.startswith(
         "plug-in 'theirs' of dikbench.scenarios (theirs_module) cannot be imported: "
         "ImportError: no module named theirs"
     )
@@ -245,10 +245,11 @@ def test_what_a_family_does_wrong_is_one_line_with_its_selector(tmp_path: Path) 
     """An exception of its own, a case that is none, a class that was not meant so."""
     selector = _family(tmp_path, "", "1 / 0")
     assert error_of(make_scenario, selector) == (
-        f"scenario {selector}: ZeroDivisionError: division by zero"
+        f"scenario {selector}: ZeroDivisionError: division by zero "
+        f"({Path(selector.partition(':')[0]).name}, line 9)"
     )
     selector = _family(tmp_path, "", "None")
-    assert error_of(make_scenario, selector).startswith(f"scenario {selector}: AttributeError: ")
+    assert error_of(make_scenario, selector).startswith(f"scenario {selector}: case() returned")
     selector = _family(tmp_path, "length: float = 1.0", decorator="# none")
     message = error_of(make_scenario, selector)
     assert message.endswith("scenario 'Mine': class Mine: write @dataclass(frozen=True) above it")
@@ -267,7 +268,7 @@ def test_a_family_from_a_file(tmp_path: Path) -> None:
     assert "did you mean 'length'?" in error_of(make_scenario, f"{selector}[lenght=2]")
     assert "valid: Mine" in error_of(make_scenario, selector.replace(":Mine", ":Mien"))
     missing = f"{tmp_path}/none.py"
-    assert error_of(make_scenario, f"{missing}:Mine") == f"scenario file not found: {missing}"
+    assert error_of(make_scenario, f"{missing}:Mine").startswith(f"file not found: {missing}")
 
 
 def test_a_family_without_a_variation_takes_seeds(tmp_path: Path) -> None:
@@ -308,10 +309,10 @@ def test_a_family_is_a_class_derived_from_family(
 
 
 def test_a_family_that_does_not_make_a_scenario_is_named(install: Install) -> None:
-    """With the selector and what went wrong, whatever it is."""
+    """With the selector and what went wrong."""
     install("dikbench.scenarios", theirs={"empty": Empty})
     message = error_of(make_scenario, "empty")
-    assert message.startswith("scenario empty: AttributeError: ")
+    assert message.startswith("scenario empty: case() returned NoneType; valid: a dikbench.")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -267,7 +267,7 @@ def test_a_store_of_another_schema_is_refused(undisturbed: Path, tmp_path: Path)
     target.write_bytes((undisturbed / "results.sqlite").read_bytes())
     with sqlite3.connect(target) as database:
         database.execute("UPDATE meta SET value = '99' WHERE key = 'schema'")
-    refused("schema version '99' is not known; this dikbench reads versions 1 to 3")
+    refused("schema version '99' is not known; this dikbench reads versions 1 to 4")
     with sqlite3.connect(target) as database:
         database.execute("UPDATE meta SET value = '1' WHERE key = 'schema'")
         database.execute("ALTER TABLE trials DROP COLUMN sigma_min")

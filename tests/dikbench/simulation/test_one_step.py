@@ -185,11 +185,14 @@ def test_inputs_are_copied() -> None:
 
 
 WRONG: dict[str, tuple[dict[str, Any], str]] = {
-    "formulation": ({"formulation": "lp-alpa"}, "did you mean 'lp-alpha'.*valid:.*dls.*qp"),
+    "formulation": ({"formulation": "lp-alpa"}, "did you mean 'lp-alpha'.*valid:.*dikbench list"),
     "formulation without name": ({"formulation": ""}, r"name\[parameter=value"),
     "unclosed bracket": ({"formulation": "dls[damping"}, r"name\[parameter=value"),
     "parameter": ({"formulation": "dls[dampin=1]"}, "'dampin'; did you mean 'damping'.* valid:"),
-    "parameter's type": ({"formulation": "dls[damping=x]"}, "damping='x'.*float"),
+    "parameter's type": (
+        {"formulation": "dls[damping=x]"},
+        "damping='x'.*valid: a number, finite and at least 0",
+    ),
     "parameter's range": ({"formulation": "dls[damping=-1]"}, "at least 0"),
     "parameter's choice": ({"formulation": "qp[braking=hard]"}, "valid: one-step, gain, sqrt"),
     "NaN damping": ({"formulation": "qp[damping=nan]"}, "at least 0"),
@@ -199,7 +202,10 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "solver": ({"formulation": "qp", "solver": "osqq"}, "'osqp'.*valid: clarabel, daqp"),
     "solver that is not needed": ({"solver": "osqq"}, "did you mean 'osqp'.*valid:"),
     "setting": ({"formulation": "qp", "solver": "osqp[eps=1]"}, "'eps'.*valid: eps_abs"),
-    "setting's type": ({"formulation": "qp", "solver": "osqp[max_iter=few]"}, "of type int"),
+    "setting's type": (
+        {"formulation": "qp", "solver": "osqp[max_iter=few]"},
+        "must be a whole number",
+    ),
     "interface": (
         {"formulation": "qp", "solver": "osqp[interface=hot]"},
         "valid: cold, cvxpy, warm",
@@ -265,7 +271,9 @@ def test_a_law_that_breaks_is_one_line(tmp_path: Any) -> None:
         "    def velocity(self, problem, solve):\n"
         "        raise KeyError('nothing')\n"
     )
-    with pytest.raises(DikbenchError, match=r"^formulation-error: KeyError: 'nothing'$"):
+    with pytest.raises(
+        DikbenchError, match=r"^formulation-error: KeyError: 'nothing' \(broken\.py, line 5\)$"
+    ):
         solve_dik(PANDA, PANDA.q0, formulation=f"{file}:Broken", twist=TWIST)
 
 

@@ -51,9 +51,15 @@ def test_our_own_settings_are_defaults_that_a_user_replaces() -> None:
         ("oqsp", r"unknown solver 'oqsp'; did you mean 'osqp'\? valid: clarabel, daqp"),
         ("", "not of the form"),
         ("osqp[eps=1e-6]", r"setting of solver osqp 'eps';.* valid: eps_abs, eps_rel, interface"),
-        ("osqp[eps_abs=small]", r"solver osqp: eps_abs must be of type float, got 'small'"),
-        ("osqp[max_iter=1.5]", r"solver osqp: max_iter must be of type int, got '1.5'"),
-        ("osqp[polishing=maybe]", r"solver osqp: polishing must be of type bool, got 'maybe'"),
+        (
+            "osqp[eps_abs=small]",
+            r"solver osqp: eps_abs must be a number, finite and at least 0, got 'small'",
+        ),
+        (
+            "osqp[max_iter=1.5]",
+            r"solver osqp: max_iter must be a whole number, finite and at least 1, got '1.5'",
+        ),
+        ("osqp[polishing=maybe]", r"solver osqp: polishing must be true or false, got 'maybe'"),
         (
             "osqp[interface=wram]",
             r"interface of solver osqp 'wram'; did you mean 'warm'\? valid: cold, cvxpy, warm$",
