@@ -100,7 +100,7 @@ def test_a_law_sweep_takes_success_the_median_error_and_the_worst_speed(
     assert figure.file == "formulation_dls_damping_1.svg"
     reach = trials[trials["scenario"].str.startswith("reach")]
     by_formulation = reach.groupby("formulation", sort=False)
-    wanted = (
+    wanted: tuple[Any, ...] = (
         [100 / 3, 200 / 3, 100.0],
         (1e3 * by_formulation["position_error_rms_m"].median())[formulations].clip(lower=1e-2),
         by_formulation["velocity_peak_ratio"].max()[formulations],
