@@ -24,10 +24,11 @@ SQUARE_ROUNDING_M2: Final = 1e-14
 
 SAMPLES_TOGETHER: Final = 64
 SEGMENTS_TOGETHER: Final = 48
-"""The distances of so many samples from so many segments are computed at once ..."""
+"""The distances of so many samples from so many segments are computed at once to begin with ..."""
 
+FEWEST_SEGMENTS_TOGETHER: Final = 16
 MOST_SEGMENTS_TOGETHER: Final = 3072
-"""... and from up to so many where the motion rests, or is elsewhere."""
+"""... and then, as the motion is fast or slow, from fewer or more segments of more or fewer."""
 
 DISTANCES_TOGETHER: Final = 32768
 """About so many distances of samples from all segments are computed at once."""
@@ -210,7 +211,10 @@ class Coverage:
             instants[covered : covered + count] = first[:count] + now
             covered += count
             now = int(instants[covered - 1]) if count else segments.stop
-            together = SEGMENTS_TOGETHER if count else min(2 * together, MOST_SEGMENTS_TOGETHER)
+            if 2 * count < len(near):
+                together = min(2 * together, MOST_SEGMENTS_TOGETHER)
+            elif 2 * (now - segments.start) < together:
+                together = max(together // 2, FEWEST_SEGMENTS_TOGETHER)
         return covered
 
     def _squares(self, samples: Any, segments: Any, pairs: bool = False) -> Array:

@@ -41,7 +41,8 @@ def with_facts(trials: pd.DataFrame) -> pd.DataFrame:
     """Fill in what trials that did not run lack of their scenario, from those that did."""
     texts = trials[list(FACTS)].replace("", np.nan)
     filled = texts.groupby([trials["scenario"], trials["seed"]], sort=False).transform("first")
-    return trials.assign(**{name: filled[name] for name in FACTS})
+    whole = trials.copy()  # in one block, whatever was added to it before
+    return whole.assign(**{name: filled[name] for name in FACTS})
 
 
 def counted(trials: pd.DataFrame, setting: Setting) -> pd.DataFrame:

@@ -125,7 +125,7 @@ def random_rows(
     }
     table = table.assign(**drawn | {"timing_samples": 100, "timing_stability": "stable"})
     table["progress_mean"] = table["progress_min"] = 1.0 - table["progress_mean"].clip(upper=1.0)
-    table = table.assign(**DONE)
+    table = table.copy().assign(**DONE, **dict.fromkeys(SEES, np.nan))
     missed = {f"missed_{rate}_hz_share": 0.0 for rate in CONTROL_RATES_HZ}
     return with_selected(table.assign(**missed).copy())  # in one block
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from math import nan
+from math import ceil, nan
 from typing import Literal
 
 import numpy as np
@@ -20,6 +20,15 @@ from dikbench.statistics.trial_matrix import CONTENDER
 
 SETTING = ["plant", "reference"]
 
+_READ = (
+    *CONTENDER, *SETTING, "scenario", "scenario_family", "status", "outcome",
+    "formulation_time_median_us", "timing_stability",
+)  # fmt: skip
+"""Columns that are read in addition to those that are shown."""
+
+ROUNDING = 1e-9
+"""Of the place of a quantile among the runs."""
+
 _Setting = tuple[str | None, str | None]
 
 
@@ -34,7 +43,8 @@ def make_table(kind: TableKind, trials: pd.DataFrame) -> Table:
         trials: the rows of trials.csv (of times, rows of timing.csv with a status will do).
     """
     chosen = [q for q in kind.quantities if q.of in {*trials.columns, *DERIVED}]
-    rows = _derived(ran(trials))
+    needed = {*_READ, *(quantity.of for quantity in chosen)}
+    rows = _derived(ran(trials[[name for name in trials if name in needed]]))
     if not kind.times:  # a failure is never folded into a time
         measured = {q.of for q in chosen} - set(DERIVED)
         rows = rows.assign(**{name: failures_at_worst(rows, name) for name in sorted(measured)})
@@ -70,12 +80,13 @@ def _derived(rows: pd.DataFrame) -> pd.DataFrame:
     """Add what is counted as columns of zeros and ones."""
     timed = rows["formulation_time_median_us"].notna()
     outcome = rows["outcome"] if "outcome" in rows else pd.Series("", rows.index)
-    return rows.assign(
-        trial=1.0,
-        stopped=outcome.isin(BROKEN).astype(float).where(outcome.fillna("").ne("")),
-        timed=timed.astype(float),
-        unstable=(timed & (rows["timing_stability"] != STABLE)).astype(float),
-    )
+    derived = {
+        "trial": 1.0,
+        "stopped": outcome.isin(BROKEN).astype(float).where(outcome.fillna("").ne("")),
+        "timed": timed.astype(float),
+        "unstable": (timed & (rows["timing_stability"] != STABLE)).astype(float),
+    }
+    return pd.concat([rows, pd.DataFrame(derived, index=rows.index)], axis=1)
 
 
 def _families(rows: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
@@ -104,17 +115,23 @@ def _block(
     """Make the rows of a family in a setting, one per formulation and solver."""
     if kind.times:
         rows = rows.drop_duplicates([*CONTENDER, "scenario"])
+    columns = [name for name in dict.fromkeys(q.of for q in quantities) if name in rows]
     found = []
     for (formulation, solver), part in rows.groupby(CONTENDER, sort=False):
         unstable = kind.times and 2 * part["unstable"].sum() >= part["timed"].sum() > 0
-        cells = [_cell(quantity, part, unstable=bool(unstable)) for quantity in quantities]
+        values = dict(
+            zip(columns, np.sort(part[columns].to_numpy(dtype=float), axis=0).T, strict=True)
+        )
+        cells = [
+            _cell(quantity, values.get(quantity.of), unstable=bool(unstable))
+            for quantity in quantities
+        ]
         found.append(TableRow(str(formulation), str(solver), tuple(cells)))
     return Block(family, *setting, tuple(found))
 
 
-def _cell(quantity: Quantity, part: pd.DataFrame, *, unstable: bool) -> TableCell:
-    values = part[quantity.of].to_numpy(dtype=float) if quantity.of in part else np.empty(0)
-    number = quantity.factor * _taken(quantity, values)
+def _cell(quantity: Quantity, values: Array | None, *, unstable: bool) -> TableCell:
+    number = nan if values is None else quantity.factor * _taken(quantity, values)
     counts = quantity.statistic is Statistic.NUMBER
     return TableCell(number, unstable=unstable and not counts)
 
@@ -123,17 +140,22 @@ def _taken(quantity: Quantity, values: Array) -> float:
     """Compute a number from those of the runs of a row, NaN where none is defined.
 
     Quantiles are values that occurred, since infinity is among them.
+
+    Args:
+        quantity: what is taken.
+        values: of the runs, in ascending order, NaN last.
     """
-    defined = values[~np.isnan(values)]
+    defined = values[: len(values) - np.count_nonzero(np.isnan(values))]
     if quantity.statistic is Statistic.NUMBER:
         return float(defined.sum())
     if not len(defined):
         return nan
     if quantity.statistic is Statistic.MEAN:
         return float(defined.mean())
-    high = _better(quantity) == "high"
     at = {Statistic.MEDIAN: 0.5, Statistic.P95: 0.95, Statistic.WORST: 1.0}[quantity.statistic]
-    return float(np.quantile(defined, 1 - at if high else at, method="inverted_cdf"))
+    if _better(quantity) == "high":
+        at = 1 - at
+    return float(defined[max(ceil(at * len(defined) - ROUNDING) - 1, 0)])
 
 
 def _notes(kind: TableKind) -> Iterator[str]:

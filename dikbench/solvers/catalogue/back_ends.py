@@ -134,7 +134,7 @@ whose answers fail the recheck, and the mean time over that of daqp:
 
 So daqp first, called cold, since a warm start answers wrongly where a quadratic program is flat;
 then clarabel: what daqp does not answer, at singularities and where a joint is outside a limit by
-rounding, piqp does not either.
+rounding, piqp does not either, nor highs (0.13 %). Presets of daqp are no better (0.14, 0.51 %).
 """
 
 

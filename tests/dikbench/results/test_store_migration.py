@@ -9,7 +9,8 @@ import pytest
 
 from dikbench.metrics import METRICS
 from dikbench.results.columns import KEYS, REDEFINED, RENAMED_METRICS, RENAMED_TIMES, TIMED
-from dikbench.results.store import SCHEMA_VERSION, Store
+from dikbench.results.schema import SCHEMA_VERSION
+from dikbench.results.store import Store
 
 ROW = {
     "id": "a",

@@ -6,16 +6,18 @@ from dataclasses import replace
 from math import asin, pi, sqrt
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from makers.scenarios import RATE, planar_scenario
 from scipy.optimize import minimize
 
 from dikbench.arrays import Array
+from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_scenario
 from dikbench.problem.constraints import CollisionConstraint
 from dikbench.robots.collision.obstacles import SphereObstacle
 from dikbench.robots.kinematics import placements
-from dikbench.scenario import Scenario, joint_oracle, measure_motion, placement_of
+from dikbench.scenario import Scenario, joint_oracle, measure_motion, placement_of, solve_placement
 from dikbench.scenario.infeasible import infeasible_because
 from dikbench.scenario.situation import Situation
 
@@ -100,6 +102,29 @@ def test_a_hand_inside_an_obstacle_is_no_and_one_that_the_tolerance_frees_is_not
     assert infeasible_because(_with_obstacle_short_by(0.004)) == ""
     wide = replace(_with_obstacle_short_by(0.03), tolerance_m=0.05)
     assert infeasible_because(wide) == ""
+
+
+def test_no_posture_frees_a_hand_that_is_said_to_be_inside() -> None:
+    """A search from many seeds, about the target within the tolerance, finds none that is clear."""
+    scenario = make_scenario("obstacle[robot=panda,where=hand,depth=0.02]")
+    assert "task frame's joint carries" in scenario.infeasible_because
+    assert scenario.motion is not None
+    (constraint,) = scenario.constraints
+    assert isinstance(constraint, CollisionConstraint)
+    robot, motion, random = scenario.robot, scenario.motion, np.random.default_rng(1)
+    deepest = int(constraint.distances(robot, motion.q).argmin())
+    target = scenario.reference.placement(motion.instants[deepest])
+    found = []
+    for _ in range(40):
+        off = random.normal(size=6)
+        off *= scenario.tolerance_m / np.linalg.norm(off * np.repeat([1.0, 0.2], 3))
+        seed = pin.integrate(robot.model, motion.q[deepest], random.uniform(-0.8, 0.8, robot.nv))
+        try:
+            found.append(solve_placement(robot, target * pin.exp6(pin.Motion(off)), seed))
+        except DikbenchError:
+            continue
+    assert len(found) > 20
+    assert constraint.distances(robot, np.array(found)).max() < constraint.margin - 1e-3
 
 
 def test_an_elbow_in_an_obstacle_proves_nothing() -> None:

@@ -1,94 +1,129 @@
-"""Figures that compare laws by a point or a bar each: Pareto, error against time, time split."""
+"""Figures that compare formulations: outcomes, success against its price, parts of a step."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from makers.rows import random_rows
 
+from dikbench.metrics import Outcome
 from dikbench.report.drawing.labels import label_points
 from dikbench.report.drawing.style import style
-from dikbench.report.figures.error_and_time import cost_points, draw_error_and_time
-from dikbench.report.figures.pareto import contender_points, draw_off_course_and_slow_down, front
+from dikbench.report.figures.outcome_bars import draw_outcome_bars
+from dikbench.report.figures.success_profile import draw_success_profiles
+from dikbench.report.figures.success_scatter import (
+    draw_success_against_slow_down,
+    draw_success_against_time,
+    success_points,
+)
 from dikbench.report.figures.time_split import PARTS, draw_time_split, time_parts
+from dikbench.report.selection.categories import CATEGORIES
 from dikbench.report.selection.rows import that_ran
 
 SCENARIOS = ["reach", "step", "hold-still"]
 
-PAIRS = st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5)), min_size=1, max_size=12)
+
+def outcomes(trials: pd.DataFrame, **of: Sequence[str]) -> pd.DataFrame:
+    """Give the trials of each formulation outcomes, in the order of the scenarios."""
+    changed = trials.copy()
+    for formulation, values in of.items():
+        changed.loc[changed["formulation"].eq(formulation), "outcome"] = list(values)
+    return changed
 
 
-@given(PAIRS)
-def test_nothing_beats_a_point_of_the_front(points: list[tuple[int, int]]) -> None:
-    """A point is off the front exactly if another is as small in both and smaller in one."""
-    for point, best in zip(points, front(np.array(points, dtype=float)), strict=True):
-        beaten = any(a <= point[0] and b <= point[1] and (a, b) != point for a, b in points)
-        assert best == (not beaten)
-
-
-def test_points_of_off_course_and_slow_down(drawn: list[Any], target: Path) -> None:
-    """A point is the mean over the scenarios; a law that violates is hollow and off the front."""
-    trials = random_rows(["slow", "wide", "both", "violating", "slower"], SCENARIOS)
-    contender = trials["formulation"]
-    trials["progress_mean"] = contender.map(
-        {"slow": 0.5, "wide": 1.0, "both": 0.4, "violating": 1.0, "slower": 0.1}
+def test_bars_are_shares_of_outcomes(drawn: list[Any], target: Path) -> None:
+    """A bar from 0 to 1 per formulation, its parts as long as the share of each category."""
+    trials = outcomes(
+        random_rows(["a", "b"], SCENARIOS),
+        a=["success", "recovered", "limit-broken"],
+        b=["late", "did-not-run", "left-path"],
     )
-    trials["direction_error_max_rad"] = np.radians(
-        contender.map({"slow": 1e-9, "wide": 90.0, "both": 90.0, "violating": 0.0, "slower": 0.0})
-    )
-    trials["violating_share"] = contender.eq("violating") * 0.1
-    trials.loc[0, "progress_mean"] = 0.2
     with style():
-        (figure,) = draw_off_course_and_slow_down(trials, target)
-    axis = drawn[0].axes[0]
-    keeping, violating = (set(map(tuple, dots.get_offsets())) for dots in axis.collections)
-    assert {(round(x), round(y)) for x, y in keeping} == {(60, 0), (0, 90), (60, 90), (90, 0)}
-    assert violating == {(0.0, 0.0)}
-    assert [round(x) for x in axis.lines[0].get_xdata()] == [0, 60]
-    assert {text.get_text() for text in axis.texts} >= {"slow", "wide", "both", "violating"}
+        (figure,) = draw_outcome_bars(trials, target)
+    assert figure.file == "outcomes_clock.svg"
+    (axis,) = drawn[0].axes
+    assert [label.get_text() for label in axis.get_yticklabels()] == ["a", "b"]
+    names = [category.name for category in CATEGORIES]
+    for place, expected in enumerate(
+        (
+            {"success": 2 / 3, "limit broken": 1 / 3},
+            {"late or unfinished": 1 / 3, "left the path": 1 / 3, "broke off": 1 / 3},
+        )
+    ):
+        bars = axis.patches[place * len(names) : (place + 1) * len(names)]
+        widths = [bar.get_width() for bar in bars]
+        assert widths == pytest.approx([expected.get(name, 0.0) for name in names])
+        starts = [bar.get_x() for bar in bars]
+        assert starts == pytest.approx(np.cumsum([0.0, *widths[:-1]]))
+
+
+def test_every_outcome_is_of_one_category() -> None:
+    """None is forgotten, none is of two."""
+    of = [outcome for category in CATEGORIES for outcome in category.outcomes]
+    assert sorted(of) == sorted(Outcome)
+
+
+def test_success_over_tolerance_is_what_the_figures_of_a_trial_say(
+    drawn: list[Any], target: Path
+) -> None:
+    """A trial 3 mm off its path succeeds from 3 mm on; a straw law is grey."""
+    trials = random_rows(["near", "far", "broken"], SCENARIOS)
+    needed = trials["formulation"].map({"near": 3e-3, "far": 3e-2, "broken": 1e-4})
+    trials = trials.assign(
+        **dict.fromkeys(
+            (
+                "contour_error_6d_max_m",
+                "tracking_error_6d_final_m",
+                "path_done_99_tolerance_m",
+                "path_done_90_tolerance_m",
+                "lag_tolerance_m",
+            ),
+            needed,
+        )
+    )
+    broken = trials["formulation"].eq("broken")
+    trials.loc[broken, ["outcome", "decided_before"]] = "limit-broken"
+    trials.loc[trials["formulation"].eq("far"), "outcome"] = "left-path"
+    with style():
+        (figure,) = draw_success_profiles(trials, target)
+    (axis,) = drawn[0].axes
+    curves = {line.get_label(): line for line in axis.lines}
+    for label, least in (("near", 3.0),):
+        x, y = curves[label].get_data()
+        assert np.array_equal(np.asarray(y) == 100.0, np.asarray(x) >= least)
+    assert not any(label.startswith(("broken", "far")) for label in curves)
+    assert len(axis.lines) == 3
     assert figure.title
-    assert (target / figure.png).is_file()
 
 
-def test_a_failed_trial_counts_worst() -> None:
-    """A trial that failed is 180 deg off course and makes none of the motion."""
-    trials = random_rows(["dls"], SCENARIOS).assign(direction_error_max_rad=0.0, progress_mean=1.0)
-    trials.loc[0, "status"] = "diverged"
-    points = contender_points(trials)
-    assert points.loc["dls", "off_course"] == 60.0
-    assert points.loc["dls", "slow_down"] == pytest.approx(100 / 3)
-
-
-def test_error_against_time_is_a_point_per_law_and_solver(drawn: list[Any], target: Path) -> None:
-    """Medians over the timed scenarios, one point per law and solver, hollow where unstable."""
-    trials = random_rows(["dls", ("qp", "daqp"), ("qp", "osqp")], SCENARIOS)
-    trials = that_ran(trials.drop(columns="contour_error_rms_m", errors="ignore"))
-    trials.loc[trials["solver"].eq("osqp"), "timing_stability"] = "drift: of the machine"
-    trials.loc[trials["scenario"].eq("step"), "formulation_time_p99_us"] = np.nan
-    points = cost_points(trials)
-    timed = trials[trials["scenario"].ne("step")].groupby("contender")
-    np.testing.assert_allclose(
-        points["time"], timed["formulation_time_p99_us"].median()[points.index]
+def test_points_of_success_and_slow_down(drawn: list[Any], target: Path) -> None:
+    """Success in percent, the geometric mean of the duration where it succeeds; hollow: stopped."""
+    trials = outcomes(
+        random_rows(["steady", "hasty"], SCENARIOS).assign(reference="path"),
+        steady=["success", "success", "left-path"],
+        hasty=["success", "limit-broken", "success"],
     )
-    np.testing.assert_allclose(
-        points["error"], 1e3 * timed["position_error_rms_m"].median()[points.index]
-    )
-    assert dict(points["stable"]) == {"dls": True, "qp, daqp": True, "qp, osqp": False}
+    trials["slow_down"] = [2.0, 8.0, 100.0, 1.0, 1.0, 1.0]
+    points = success_points(trials)
+    assert points["success"].tolist() == pytest.approx([200 / 3, 200 / 3])
+    assert points["slow_down"].tolist() == pytest.approx([4.0, 1.0])
+    assert points["stopped"].tolist() == [False, True]
+    times = trials.groupby("formulation", sort=False)["formulation_time_p99_us"].median() / 1e3
+    assert points["time"].tolist() == pytest.approx(times.tolist())
     with style():
-        draw_error_and_time(trials, target)
-    dots = {d.get_label(): d for d in drawn[0].axes[0].collections}
-    hollow = dots["with a solver, timing not stable"]
-    np.testing.assert_allclose(
-        hollow.get_offsets()[0], points.loc["qp, osqp", ["time", "error"]].astype(float)
-    )
-    assert (hollow.get_facecolors()[0] == 1.0).all()
-    assert {text.get_text() for text in drawn[0].axes[0].texts} >= set(points.index)
+        draw_success_against_slow_down(trials, target)
+        draw_success_against_time(trials, target)
+    for figure, across in zip(drawn, ("slow_down", "time"), strict=True):
+        kept, stopped = figure.axes[0].collections
+        assert kept.get_offsets()[0].tolist() == pytest.approx(points[[across, "success"]].iloc[0])
+        assert (stopped.get_facecolors()[0] == 1.0).all()
+        assert {text.get_text() for text in figure.axes[0].texts} >= {"steady", "hasty"}
 
 
 def test_bars_are_the_parts_of_a_step(drawn: list[Any], target: Path) -> None:

@@ -13,7 +13,7 @@ from matplotlib.collections import QuadMesh
 from dikbench.arrays import Array
 from dikbench.report.drawing.style import style
 from dikbench.report.figures.phase_diagram import draw_phase_diagrams, three_digits
-from dikbench.report.selection.categories import CATEGORIES, categories
+from dikbench.report.selection.categories import CATEGORIES
 from dikbench.report.selection.phase_grids import phase_grids
 
 MISSES, SPEEDS = (0.0, 0.01, 0.1), (0.2, 1.0)
@@ -55,21 +55,10 @@ def test_cells_hold_what_the_table_says(drawn: list[Any], target: Path) -> None:
             ]
 
 
-def test_the_worst_that_applies_is_the_outcome() -> None:
-    """Failed comes before violating, that before off course, that before slow."""
-    trials = random_rows(["dls"], GRID)
-    trials["status"] = ["crashed", *["ok"] * 5]
-    trials["violating_share"] = [0.5, 0.5, 0.0, 0.0, 0.0, np.nan]
-    trials["direction_error_max_rad"] = [1.0, 1.0, 1.0, 0.0, 0.0, np.nan]
-    trials["progress_min"] = [0.0, 0.0, 0.0, 0.5, 1.0, np.nan]
-    named = [CATEGORIES[code] for code in categories(trials)]
-    assert named == ["failed", "violating", "off course", "slow", "ok", "ok"]
-
-
 def test_a_failed_trial_is_black_and_a_missing_one_blank(drawn: list[Any], target: Path) -> None:
     """No number of a trial that did not end well is shown, nor of one that was never run."""
     trials = random_rows(["dls"], GRID)
-    trials.loc[0, "status"] = "diverged"
+    trials.loc[0, ["status", "outcome"]] = "diverged"
     with style():
         draw_phase_diagrams(trials.drop(index=5), target)
     axis = drawn[0].axes[0]
@@ -80,20 +69,18 @@ def test_a_failed_trial_is_black_and_a_missing_one_blank(drawn: list[Any], targe
     assert np.isnan(failed[1, 2])
     assert np.isfinite(shown).sum() == 4
     assert np.isfinite(failed).sum() == 1
-    assert cells(drawn[2].axes[0])[0, 0] == CATEGORIES.index("failed")
+    assert cells(drawn[2].axes[0])[0, 0] == len(CATEGORIES) - 1
 
 
 def test_laws_stand_in_the_order_of_how_they_do(drawn: list[Any], target: Path) -> None:
     """The oracle first, a law that keeps the limits before one that does not, then by the error."""
     trials = random_rows(["violating", "far", "near", "oracle"], GRID)
     formulation = trials["formulation"]
-    trials["violating_share"] = formulation.eq("violating") * 1.0
-    trials["direction_error_max_rad"] = 0.0
-    trials["progress_min"] = 1.0
+    trials["outcome"] = np.where(formulation.eq("violating"), "limit-broken", "success")
     trials["position_error_rms_m"] = formulation.map(
         {"violating": 0.0, "near": 1e-3, "far": 1e-2, "oracle": 1.0}
     )
-    trials = trials.drop(columns="contour_error_rms_m", errors="ignore")
+    trials = trials.drop(columns="contour_error_rms_m", errors="ignore").copy()
     with style():
         draw_phase_diagrams(trials, target)
     titles = [axis.get_title() for axis in drawn[0].axes if axis.get_title()]
