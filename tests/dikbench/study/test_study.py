@@ -63,7 +63,7 @@ def test_every_shipped_study_expands_to_trials_with_distinct_ids(name: str) -> N
 
 
 def test_quick_covers_laws_families_and_solvers() -> None:
-    """The default study has five formulations, the oracle, four families and six QP solvers."""
+    """The default study has six formulations, the oracle, six families and six QP solvers."""
     trials = [planned.trial for planned in expand(load_study("quick"))]
     formulations = {trial.formulation.name for trial in trials}
     families = {trial.scenario.name for trial in trials}
@@ -76,7 +76,14 @@ def test_quick_covers_laws_families_and_solvers() -> None:
         "lp-alpha",
         "lp-alpha-cvxpy",
     }
-    assert families == {"reach", "near-miss", "joint-limit-crossing", "speed-sweep"}
+    assert families == {
+        "reach",
+        "near-miss",
+        "joint-limit-crossing",
+        "joint-limit-graze",
+        "joint-limit-detour",
+        "speed-sweep",
+    }
     solvers = [parse_solver(trial.solver) for trial in trials if str(trial.formulation) == "qp"]
     assert len({solver.name for solver in solvers}) == 6
     assert {solver.interface for solver in solvers} == {"cold", "warm"}
