@@ -15,6 +15,9 @@ from dikbench.cli.checking import check
 from dikbench.cli.one_line_errors import one_line_errors
 from dikbench.cli.reading_commands import compare, replay
 
+EXIT_CODE_OF_STANDSTILL = 3
+"""Exit code of a run in which no trial of a formulation took a step."""
+
 SUBJECTS = ("formulations", "scenarios", "solvers", "plants", "robots", "metrics", "studies")
 
 
@@ -84,7 +87,7 @@ STUDY_OPTIONS = (
         "--out",
         type=click.Path(path_type=Path, file_okay=False),
         metavar="DIR",
-        help="Results folder; default: runs/STUDY.",
+        help="Results folder; default: runs/STUDY, without STUDY one for each selection.",
     ),
 )
 
@@ -160,10 +163,13 @@ def run(
 
     STUDY is a shipped study (see `dikbench list studies`) or a TOML file; default: quick. Each
     option replaces an axis of the study. The same command continues a run that was stopped.
+
+    The exit code is 0 also where trials failed, which the report counts; 3 where no trial of a
+    formulation took a step, 2 where nothing could be run, 130 where the run was stopped.
     """
     from dikbench.report.write import write_report
     from dikbench.run.pool import available_cores
-    from dikbench.run.runner import Interrupted, RunSettings, run_study
+    from dikbench.run.runner import Interrupted, RunSettings, never_moved, run_study
 
     selected, folder = _selected(study, axes, out)
     command = shlex.join(["dikbench", *sys.argv[1:]])
@@ -175,6 +181,11 @@ def run(
         click.echo(f"\nstopped: {stopped}; to continue: {command}", err=True)
         sys.exit(130)
     click.echo(f"\n{write_report(folder)}\n\n{folder / 'report.html'}")
+    standstill = never_moved(folder)
+    for name, reason in standstill.items():
+        click.echo(f"no trial of {name} took a step: {reason}", err=True)
+    if standstill:
+        sys.exit(EXIT_CODE_OF_STANDSTILL)
 
 
 @commands.command()

@@ -18,7 +18,14 @@ from dikbench.run.pool import available_cores
 from dikbench.run.runner import RunSettings
 from dikbench.run.trial_row import TracePolicy
 from dikbench.scenario.plant import REFERENCE_MODES
-from dikbench.study.study import DEFAULT_STUDY, Selection, Study, load_study, select
+from dikbench.study.study import (
+    DEFAULT_STUDY,
+    Selection,
+    Study,
+    folder_of,
+    load_study,
+    select,
+)
 
 Selectors = str | Iterable[str]
 
@@ -56,13 +63,15 @@ def run_study(
 
     Args:
         study: a shipped study (see `dikbench list studies`) or a TOML file; default: quick.
-        formulations: selectors that replace those of the study.
+        formulations: selectors that replace those of the study; none, here and below: the study's
+            own.
         scenarios: the same.
         solvers: the same.
         seeds: seeds of the scenarios that replace those of the study.
         plants: selectors that replace those of the study.
         references: `time` or `path`: what advances the reference.
-        out: results folder; default: runs/STUDY.
+        out: results folder; default: runs/STUDY, and one of its own for each selection without a
+            study.
         jobs: number of worker processes; default: one per core.
         trial_timeout: wall-clock limit of a trial [s].
         trial_memory: memory of a trial [MB].
@@ -106,8 +115,8 @@ def selected(study: str | None, selection: Selection) -> Study:
 
 
 def results_folder(study: Study, out: str | Path | None) -> Path:
-    """Return where a study's results go: the folder that was named, else runs/STUDY."""
-    return Path(out) if out is not None else Path("runs") / study.name
+    """Return where a study's results go: the folder that was named, else one in runs."""
+    return Path(out) if out is not None else Path("runs") / folder_of(study)
 
 
 def _texts(axis: str, given: Selectors) -> tuple[str, ...]:

@@ -104,11 +104,9 @@ class Store:
             [(*p.trial.row.values(), number, p.id) for number, p in enumerate(planned)],
         )
         timed = {
-            tuple(p.trial.row[name] for name in TIMED): timing_id(
-                p.trial.formulation, p.trial.solver, p.trial.scenario
-            )
-            for p in planned
-            if p.trial.formulation.name not in ORACLES
+            tuple(t.row[name] for name in TIMED): timing_id(t.formulation, t.solver, t.scenario)
+            for t in (p.trial for p in planned)
+            if t.formulation.name not in ORACLES
         }
         self._database.executemany(
             "UPDATE OR REPLACE times SET formulation = ?, solver = ?, scenario = ? WHERE id = ?",
@@ -151,6 +149,12 @@ class Store:
             StoredTrial(name, Trial.of(**dict(zip(TRIAL, cell, strict=True))), steps, status)
             for name, steps, status, *cell in rows
         ]
+
+    def planned(self) -> pd.DataFrame:
+        """Return the formulation, status, message and steps of the trials of the last plan."""
+        return self._frame(
+            "SELECT formulation, status, message, steps FROM trials WHERE position IS NOT NULL", ()
+        )
 
     def hidden(self) -> int:
         """Count the trials that are kept and not shown, since their sources have changed."""
@@ -252,11 +256,10 @@ class Store:
 
     def note(self, key: str, value: Any) -> None:
         """Add an entry to the description of the last run."""
-        noted = json.dumps({**self._last_run(), key: value})
+        noted = [json.dumps({**self._last_run(), key: value})]
+        last = "(SELECT MAX(id) FROM runs)"
         with self._guarded():
-            self._database.execute(
-                "UPDATE runs SET manifest = ? WHERE id = (SELECT MAX(id) FROM runs)", [noted]
-            )
+            self._database.execute(f"UPDATE runs SET manifest = ? WHERE id = {last}", noted)
 
     def close_neatly(self) -> None:
         """Fold the write-ahead log into the file."""

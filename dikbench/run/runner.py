@@ -303,6 +303,29 @@ def _time(
             display.advance()
 
 
+def never_moved(out: Path) -> dict[str, str]:
+    """Find the formulations of the last study of which no trial took a step.
+
+    Oracles are among them only where nothing else moved.
+
+    Returns:
+        The reason most of their trials have, by the name of the formulation.
+
+    Raises:
+        DikbenchError: if the folder holds no results.
+    """
+    with ResultsFolder(out).open_store() as store:
+        trials = store.planned()
+    still = trials[~trials.groupby("formulation")["steps"].transform("max").gt(0)]
+    reasons = (still["status"] + ": " + still["message"]).groupby(still["formulation"], sort=False)
+    found = {str(name): f"{len(each)} ended as {each.mode().iloc[0]}" for name, each in reasons}
+    of_formulations = {
+        name: reason for name, reason in found.items() if parse_selector(name).name not in ORACLES
+    }
+    moved = trials["steps"].gt(0).any()
+    return of_formulations if of_formulations or moved else found
+
+
 def status_of(out: Path) -> dict[str, int]:
     """Count the trials of the last study by status, and those that are missing.
 

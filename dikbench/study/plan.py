@@ -21,14 +21,14 @@ from dikbench.selector import Selector, parse_selector
 from dikbench.solvers.catalogue.back_ends import parse_solver, why_not
 from dikbench.study.identity import trial_id
 from dikbench.study.split import check_split
-from dikbench.study.study import Study, load_study
+from dikbench.study.study import Study, load_study, naming
 from dikbench.study.trial import NO_SOLVER, Trial
 
 SCENARIOS_BUILT_FIRST: Final = 40
 """Number of scenarios that are built before anything runs; of the others the parameters are
 checked, and a failed certificate gives a skipped row."""
 
-IDEAL_PLANT: Final = Selector("ideal")
+IDEAL_PLANT: Final = "ideal"
 
 
 class PlannedTrial(msgspec.Struct, frozen=True):
@@ -52,29 +52,46 @@ def expand(study: Study) -> list[PlannedTrial]:
     scenarios = [parse_selector(text) for text in study.scenarios]
     all_plants = [parse_selector(text) for text in study.plants]
     for number, scenario in enumerate(scenarios):
-        if number < SCENARIOS_BUILT_FIRST:
-            make_scenario(scenario, study.seeds[0])
-        else:
-            scenario_parameters(scenario)
+        with naming(scenario, study.name):
+            if number < SCENARIOS_BUILT_FIRST:
+                make_scenario(scenario, study.seeds[0])
+            else:
+                scenario_parameters(scenario)
     for plant in all_plants:
-        make_plant(plant)
+        with naming(plant, study.name):
+            make_plant(plant)
     _check_split(study, scenarios)
     _check_timing(study)
     planned: dict[str, PlannedTrial] = {}
     for cells in study.cells:
         for formulation in map(parse_selector, cells.formulations):
-            # Oracles have no feedback: plants make no difference, and to a motion at its nominal
-            # speed reference modes make none.
-            plants = [IDEAL_PLANT] if formulation.name in ORACLES else all_plants
-            references = ("time",) if formulation.name == ORACLE else study.references
+            plants, references = (
+                chosen or asked
+                for chosen, asked in zip(
+                    ways_of(formulation.name), (study.plants, study.references), strict=True
+                )
+            )
             for solver, skip in _solvers_for(study, formulation, cells.solvers):
                 for scenario, plant, reference, seed in itertools.product(
-                    scenarios, plants, references, study.seeds
+                    scenarios, map(parse_selector, plants), references, study.seeds
                 ):
                     trial = Trial(formulation, scenario, solver, plant, reference, seed)
                     name = trial_id(trial)
                     planned.setdefault(name, PlannedTrial(name, trial, skip))
     return list(planned.values())
+
+
+def ways_of(formulation: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the plants and the references with which a formulation runs, whatever a study asks.
+
+    Empty ones are those that the study asks for. Oracles have no feedback: plants make no
+    difference, and to a motion at its nominal speed reference modes make none.
+
+    Args:
+        formulation: its name.
+    """
+    plants = (IDEAL_PLANT,) if formulation in ORACLES else ()
+    return plants, ("time",) if formulation == ORACLE else ()
 
 
 def _check_split(study: Study, scenarios: Sequence[Selector]) -> None:
@@ -99,8 +116,12 @@ def _solvers_for(
     study: Study, formulation: Selector, solvers: Sequence[str]
 ) -> list[tuple[Selector, str]]:
     """Return the solvers with which a formulation runs, each with the reason if it cannot."""
-    program = None if formulation.name in ORACLES else program_of(make_formulation(formulation))
-    parsed = [(parse_selector(text), parse_solver(text)) for text in solvers]
+    with naming(formulation, study.name):
+        program = None if formulation.name in ORACLES else program_of(make_formulation(formulation))
+    parsed = []
+    for selector in map(parse_selector, solvers):
+        with naming(selector, study.name):
+            parsed.append((selector, parse_solver(selector)))
     if program is None:
         return [(NO_SOLVER, "")]
     if not parsed:

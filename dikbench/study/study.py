@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
@@ -17,6 +18,7 @@ from dikbench.plugins.building import (
     make_plant,
     scenario_parameters,
 )
+from dikbench.plugins.source import digest
 from dikbench.problem.problem import program_of
 from dikbench.programs.quadratic_program import ProgramKind
 from dikbench.scenario.oracle import ORACLES
@@ -32,9 +34,15 @@ from dikbench.study.split import SPLITS
 
 DEFAULT_STUDY = "quick"
 
+SELECTED: Final = "selection"
+"""The name of a study that was selected without naming one."""
+
 KIND_OF_AXIS: Final[Mapping[str, Literal["formulation", "scenario", "plant"]]] = MappingProxyType(
     {"formulations": "formulation", "scenarios": "scenario", "plants": "plant"}
 )
+
+DIGITS: Final = 8
+"""So many of a digest distinguish the folders of selections."""
 
 NOT_EMPTY = msgspec.Meta(min_length=1)
 Names = Annotated[tuple[str, ...], NOT_EMPTY]
@@ -202,6 +210,17 @@ def _check_solver(text: str) -> None:
         parse_solver(text)
 
 
+def folder_of(study: Study) -> str:
+    """Name the folder of a study's results: its name, and of a selection what was selected.
+
+    Two selections have a folder each, so that no table mixes them; the same one given again has
+    the same.
+    """
+    if study.name != SELECTED:
+        return study.name
+    return f"{SELECTED}-{digest(msgspec.json.encode(study).decode())[:DIGITS]}"
+
+
 class Selection(msgspec.Struct, frozen=True):
     """Replacements of the axes of a study; an empty axis keeps the study's own."""
 
@@ -246,7 +265,7 @@ def select(base: Study, selection: Selection, *, named: bool) -> Study:
     if base.timing is not None and selection.scenarios:
         changes["timing"] = msgspec.structs.replace(base.timing, scenarios=())
     if not named:
-        changes |= {"name": "selection", "description": "Selected on the command line"}
+        changes |= {"name": SELECTED, "description": "Selected on the command line"}
     return msgspec.structs.replace(base, cells=cells, **changes)
 
 
@@ -265,4 +284,16 @@ def _program_of(formulation: str | Selector) -> ProgramKind | None:
     """Return what a formulation needs a solver for; the oracles need none."""
     if parse_selector(formulation).name in ORACLES:
         return None
-    return program_of(make_formulation(formulation))
+    with naming(formulation):
+        return program_of(make_formulation(formulation))
+
+
+@contextmanager
+def naming(selector: str | Selector, study: str = "") -> Iterator[None]:
+    """Have an error say which selector (of which study) it is about: a sweep has many."""
+    try:
+        yield
+    except DikbenchError as error:
+        where = f"study {study}: " if study else ""
+        named = "" if str(selector) in str(error) else f"{str(selector)!r}: "
+        raise DikbenchError(f"{where}{named}{error}") from None

@@ -12,10 +12,12 @@ from dikbench.plugins.finding import plugins
 from dikbench.report.sentences.words import listed, number, quoted, several
 from dikbench.scenario.oracle import ORACLE
 from dikbench.scenario.plant import PLANTS, REFERENCE_MODES
+from dikbench.selector import parse_selector
 from dikbench.solvers.catalogue.back_ends import BACK_ENDS, is_installed
 from dikbench.statistics.failures import SKIPPED, has_failed
 from dikbench.statistics.stability import STABLE
 from dikbench.statistics.trial_matrix import CONTENDER
+from dikbench.study.plan import ways_of
 
 WORTH_SAYING: Final = 0.01
 """A share of steps above this is remarked upon."""
@@ -80,9 +82,15 @@ def _missing(trials: pd.DataFrame, manifest: Mapping[str, Any]) -> list[Limitati
 def in_plan(trials: pd.DataFrame, study: Mapping[str, Any]) -> pd.Series:
     """Which rows the study asks for; all of them where it does not say."""
     inside = pd.Series(True, trials.index)
-    for axis in ("scenario", "plant", "reference", "seed"):
-        if wanted := study.get(f"{axis}s"):
-            inside &= trials[axis].isin(wanted)
+    names = trials["formulation"].map(lambda text: parse_selector(text).name)
+    for place, axis in enumerate(("plant", "reference")):
+        if asked := study.get(f"{axis}s"):
+            wanted = {name: ways_of(name)[place] or asked for name in names.unique()}
+            pairs = zip(names, trials[axis], strict=True)
+            inside &= pd.Series([value in wanted[name] for name, value in pairs], trials.index)
+    for axis in ("scenario", "seed"):
+        if asked := study.get(f"{axis}s"):
+            inside &= trials[axis].isin(asked)
     if cells := study.get("cells"):
         asked = {
             (formulation, solver)

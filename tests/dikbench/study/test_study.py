@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -7,9 +8,19 @@ import pytest
 
 from dikbench.cli.listing import description
 from dikbench.errors import DikbenchError
+from dikbench.plugins.finding import plugins
+from dikbench.scenario.oracle import ORACLES
+from dikbench.selector import parse_selector
 from dikbench.solvers.catalogue.back_ends import parse_solver
 from dikbench.study.plan import expand
-from dikbench.study.study import Selection, Study, load_study, select, shipped_studies
+from dikbench.study.study import (
+    Selection,
+    Study,
+    folder_of,
+    load_study,
+    select,
+    shipped_studies,
+)
 
 MINIMAL = """
 description = "a study"
@@ -52,7 +63,7 @@ def test_every_shipped_study_expands_to_trials_with_distinct_ids(name: str) -> N
 
 
 def test_quick_covers_laws_families_and_solvers() -> None:
-    """The default study has five formulations, the oracle, four families and six QP solvers."""
+    """The default study has six formulations, the oracle, six families and six QP solvers."""
     trials = [planned.trial for planned in expand(load_study("quick"))]
     formulations = {trial.formulation.name for trial in trials}
     families = {trial.scenario.name for trial in trials}
@@ -65,7 +76,14 @@ def test_quick_covers_laws_families_and_solvers() -> None:
         "lp-alpha",
         "lp-alpha-cvxpy",
     }
-    assert families == {"reach", "near-miss", "joint-limit-crossing", "speed-sweep"}
+    assert families == {
+        "reach",
+        "near-miss",
+        "joint-limit-crossing",
+        "joint-limit-graze",
+        "joint-limit-detour",
+        "speed-sweep",
+    }
     solvers = [parse_solver(trial.solver) for trial in trials if str(trial.formulation) == "qp"]
     assert len({solver.name for solver in solvers}) == 6
     assert {solver.interface for solver in solvers} == {"cold", "warm"}
@@ -168,3 +186,68 @@ def test_a_timing_reference_that_needs_a_solver_is_an_error(
 def test_a_study_as_it_is_shown_is_a_study(write_study: WriteStudy) -> None:
     """What `dikbench show quick` prints can be saved and run."""
     assert load_study(write_study(description("quick"))).scenarios == load_study("quick").scenarios
+
+
+@pytest.mark.parametrize(
+    ("axis", "sweep", "named"),
+    [
+        ("formulations", "dls[damping=0.1|-1]", "'dls[damping=-1]'"),
+        ("scenarios", "near-miss[robot=ur5,miss=0.02|7]", "'near-miss[robot=ur5,miss=7]'"),
+        ("plants", "ideal[noise=1e-4|-3]", "'ideal[noise=-3]'"),
+        ("solvers", "daqp[primal_tol=1e-6|x]", "'daqp[primal_tol=x]'"),
+    ],
+)
+def test_a_bad_value_in_a_sweep_names_its_cell(axis: str, sweep: str, named: str) -> None:
+    """The whole study is refused, in one line that says which of its cells is wrong."""
+    given = {"formulations": ("qp",), "scenarios": ("reach",), axis: (sweep,)}
+    with pytest.raises(DikbenchError) as caught:
+        expand(select(load_study("quick"), Selection(**given), named=False))  # type: ignore[arg-type]
+    assert named in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_the_oracles_run_in_the_one_way_that_they_have() -> None:
+    """Whatever plants and references are asked for; a slowed one may wait like any other."""
+    chosen = Selection(
+        formulations=("oracle", "slowed-oracle", "dls"),
+        scenarios=("reach",),
+        plants=("saturating",),
+        references=("path",),
+    )
+    trials = [p.trial for p in expand(select(load_study("quick"), chosen, named=False))]
+    assert {(str(t.formulation), str(t.plant), t.reference) for t in trials} == {
+        ("oracle", "ideal", "time"),
+        ("slowed-oracle", "ideal", "path"),
+        ("dls", "saturating", "path"),
+    }
+
+
+def test_each_selection_has_a_folder_of_its_own() -> None:
+    """The same one the same, in whatever order its parameters are; a named study has its name."""
+
+    def folder(formulation: str, scenario: str = "reach", seeds: tuple[int, ...] = ()) -> str:
+        chosen = Selection((formulation,), (scenario,), seeds=seeds)
+        return folder_of(select(load_study("quick"), chosen, named=False))
+
+    one = folder("dls[damping=0.1]", "reach[robot=ur5,distance=0.1]")
+    assert one == folder("dls[damping=0.1]", "reach[distance=0.1,robot=ur5]")
+    folders = {one, folder("dls"), folder("qp"), folder("dls", "step"), folder("dls", seeds=(1,))}
+    assert len(folders) == 5
+    assert all(re.fullmatch(r"selection-[0-9a-f]{8}", name) for name in folders)
+    assert folder_of(load_study("quick")) == "quick"
+
+
+@pytest.mark.parametrize("name", ["full", "quick", "smoke"])
+def test_a_study_is_what_its_description_says(name: str) -> None:
+    """Numbers of formulations (oracles are none), scenarios and families."""
+    study = load_study(name)
+    formulations = {parse_selector(f).name for cells in study.cells for f in cells.formulations}
+    numbers = {
+        "formulations": len(formulations - set(ORACLES)),
+        "scenarios": len(study.scenarios),
+        "families": len({parse_selector(text).name for text in study.scenarios}),
+    }
+    told = {what: int(n) for n, what in re.findall(r"(\d+) (\w+)", study.description)}
+    assert {what: told[what] for what in numbers} == numbers
+    everything = not set(plugins("formulation")) - formulations
+    assert study.description.startswith("All") == everything
