@@ -87,7 +87,7 @@ def test_quick_covers_laws_families_and_solvers() -> None:
     solvers = [parse_solver(trial.solver) for trial in trials if str(trial.formulation) == "qp"]
     assert len({solver.name for solver in solvers}) == 6
     assert {solver.interface for solver in solvers} == {"cold", "warm"}
-    assert {str(trial.plant) for trial in trials} == {"ideal", "saturating"}
+    assert {trial.reference for trial in trials} == {"time", "path"}
 
 
 def test_a_law_without_solver_runs_once_whatever_solvers_are_named() -> None:
