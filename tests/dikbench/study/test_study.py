@@ -251,3 +251,10 @@ def test_a_study_is_what_its_description_says(name: str) -> None:
     assert {what: told[what] for what in numbers} == numbers
     everything = not set(plugins("formulation")) - formulations
     assert study.description.startswith("All") == everything
+
+
+@pytest.mark.parametrize("axis", ["formulations", "scenarios", "plants", "solvers"])
+def test_names_joined_by_a_comma_are_told_apart_from_one(axis: str) -> None:
+    """A comma belongs into brackets: several are given one by one."""
+    with pytest.raises(DikbenchError, match=r"'dls,qp' is one name; valid: each .* on its own"):
+        select(load_study("quick"), Selection(**{axis: ("dls,qp",)}), named=False)  # type: ignore[arg-type]
