@@ -78,4 +78,4 @@ def in_words(error: BaseException) -> str:
 def _is_an_authors(file: str) -> bool:
     installed = (sysconfig.get_path("stdlib"), str(Path(__file__).parent))
     inside = file.startswith(installed) or "site-packages" in file or "dist-packages" in file
-    return not inside and not file.startswith("<")
+    return not inside and file.endswith(".py")

@@ -291,6 +291,10 @@ def _check_case(case: object) -> None:
         raise DikbenchError(
             f"reference.velocity(0) has the shape {np.shape(twist)}; valid: a body twist (6,)"
         )
+    for tau in (0.0, case.reference.duration):
+        pose, twist = case.reference.placement(tau).homogeneous, case.reference.velocity(tau)
+        if not (np.isfinite(pose).all() and np.isfinite(twist).all()):
+            raise DikbenchError(f"the reference is not finite at {tau:.4g} s")
 
 
 def certified_robots(family: type[Family]) -> tuple[str, ...]:

@@ -34,7 +34,7 @@ def sampling_floor(scenario: Scenario) -> float:
     """Compute by how much [m] the pseudo-inverse leaves a path because it is asked in steps only.
 
     It is the largest distance from the path of v = J^+ V (V with the correction by the gain), held
-    for a control period, without any limit.
+    for a control period, without any limit; infinite where the motion does not stay finite.
     """
     robot, dt, path = scenario.robot, scenario.dt, scenario.embedded_path
     assert path is not None
@@ -48,4 +48,4 @@ def sampling_floor(scenario: Scenario) -> float:
         task = scenario.first.linearize(kinematics, *scenario.target(k * dt))
         q = pin.integrate(robot.model, q, dt * (pseudo_inverse(task.J, RCOND) @ task.V))
     points = scenario.embedding.points(np.array(rotations), np.array(translations))
-    return float(path.nearest(points)[0].max())
+    return float(path.nearest(points)[0].max()) if np.isfinite(points).all() else np.inf

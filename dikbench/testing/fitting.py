@@ -41,14 +41,10 @@ def misfits(scenario: Scenario) -> Iterator[str]:
 
 
 def _wrong_sizes(scenario: Scenario) -> Iterator[str]:
-    robot, reference = scenario.robot, scenario.reference
+    robot = scenario.robot
     for name, value, size in (("q0", scenario.q0, robot.nq), ("v0", scenario.v0, robot.nv)):
         if value.shape != (size,) or not np.isfinite(value).all():
             yield f"{name} must be {size} finite numbers, got {value.tolist()}"
-    for tau in (0.0, reference.duration):
-        pose, twist = reference.placement(tau).homogeneous, reference.velocity(tau)
-        if not (np.isfinite(pose).all() and np.isfinite(twist).all()):
-            yield f"the reference is not finite at {tau:.4g} s"
     motion = scenario.motion
     if motion is not None and motion.q.shape != (len(motion.instants), robot.nq):
         yield (

@@ -63,6 +63,9 @@ ELSEWHERE: Mapping[str, set[str]] = {
 
 CLOSED = [name for name in SCENARIOS if name != "csv"]
 
+SLOW = ("humanoid", "obstacle")
+"""Families that take long to make many times."""
+
 
 def _selectors(name: str) -> list[str]:
     return [f"{name}[{given}]" if given else name for given in VARIANTS.get(name, ("",))]
@@ -115,7 +118,7 @@ def _blunted(name: str, patch: pytest.MonkeyPatch) -> Iterator[None]:
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(n, marks=pytest.mark.long if n == "humanoid" else ()) for n in CLOSED],
+    [pytest.param(n, marks=pytest.mark.long if n in SLOW else ()) for n in CLOSED],
 )
 def test_every_claim_can_fail(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """For each there is a blunted scenario whose certificate names it, here or in a test of its."""

@@ -230,7 +230,7 @@ def test_what_is_no_family_is_named() -> None:
     ("family", "words"),
     [
         (NoRange(), "stretch is a number without a Range"),
-        (AcceptsAnything(), r"depth=nan is accepted; valid: 0 to 0.3 \[m\]"),
+        (AcceptsAnything(), r"depth=nan is accepted; valid: a number, 0 to 0.3 \[m\]"),
         (BreaksAtAnEnd(), "slowness=0.0: raised ZeroDivisionError"),
         (ClaimsNothing(), "seed 0: the certificate claims nothing"),
         (ClaimsTooMuch(), "seed 1: certificate of .* failed: seed = 1, must be >= 0 and <= 0"),
