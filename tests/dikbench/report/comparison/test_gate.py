@@ -50,7 +50,11 @@ def test_a_trial_that_vanished_is_a_regression(folder: Callable[..., Path]) -> N
         1,
         "REGRESSED: 6 trials of A missing in B.",
     )
-    assert dikbench(a, b).exit_code == 0
+    ungated = dikbench(a, b)
+    assert (ungated.exit_code, first_line(ungated)) == (
+        0,
+        "B differs from A; without --tolerance nothing is judged.",
+    )
 
 
 def test_a_cell_that_was_skipped_in_a_may_be_missing(folder: Callable[..., Path]) -> None:
