@@ -181,6 +181,11 @@ def _each(axis: str, selectors: Iterable[str]) -> tuple[str, ...]:
     found: dict[str, None] = {}
     for given in selectors:
         for one in alternatives(given):
+            if "," in one.name and ".py:" not in one.name:
+                raise DikbenchError(
+                    f"{given!r} is one name; valid: each of the {axis} on its own, as options "
+                    "that are repeated or entries of a list"
+                )
             found[str(_canonical(axis, one))] = None
     return tuple(found)
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Final
 
 import pandas as pd
 
@@ -13,10 +13,13 @@ from dikbench.report.comparison.times import COMPARED, RATIOS, untimed
 from dikbench.report.comparison.tolerances import SUCCESS, Tolerance
 from dikbench.report.sentences.words import several
 
-ROUNDING: float = 1e-9
+ROUNDING: Final = 1e-9
 """A fall of the rate of success below this comes from adding in another order."""
 
-SOLVER_FAILED = "solver_failed_share"
+SOLVER_FAILED: Final = "solver_failed_share"
+
+TOLD: Final = 3
+"""So many formulations of a kind are told in the first line."""
 
 
 def breaches(
@@ -71,11 +74,11 @@ def _falls(success: pd.DataFrame, tolerances: Sequence[Tolerance]) -> list[str]:
         return []
     allowed = min(given, default=0.0) + ROUNDING
     fallen = success[success["rate_a"] - success["rate_b"] > allowed]
-    return [
+    return _few(
         f"success of {named(row)} ({row['plant']} plant, {row['setting']}) fell from "
         f"{100 * row['rate_a']:.1f} to {100 * row['rate_b']:.1f} %"
         for row in fallen.to_dict("records")
-    ]
+    )
 
 
 def _slower(
@@ -94,12 +97,19 @@ def _slower(
     found = [f"{several(lost, 'timed cell')} of A without times in B"] if lost else []
     for tolerance in asked:
         slower = times[times[RATIOS[tolerance.metric]] > 1 + tolerance.bound]
-        found += [
+        found += _few(
             f"{named(row)} takes {row[RATIOS[tolerance.metric]]:.3g} times as long "
             f"({tolerance.metric})"
             for row in slower.to_dict("records")
-        ]
+        )
     return found
+
+
+def _few(phrases: Iterable[str]) -> list[str]:
+    """Return the first phrases, and how many more there are."""
+    told = list(phrases)
+    left = len(told) - TOLD
+    return told if left <= 0 else [*told[:TOLD], f"{left} more like it"]
 
 
 def named(row: Mapping[Any, Any]) -> str:

@@ -66,10 +66,11 @@ def _verdict(comparison: Comparison) -> str:
     """Say in one line whether B passes."""
     if comparison.regressed:
         return f"REGRESSED: {'; '.join(comparison.breaches)}."
-    same = "no difference" if comparison.nothing_differs else ""
     if comparison.guarded:
-        return f"Within tolerance{': ' if same else ''}{same}."
-    return f"{same or 'B differs from A; without --tolerance nothing is judged'}.".capitalize()
+        return f"Within tolerance{': no difference' if comparison.nothing_differs else ''}."
+    if comparison.nothing_differs:
+        return "No difference."
+    return "B differs from A; without --tolerance nothing is judged."
 
 
 def _summary(comparison: Comparison) -> str:

@@ -244,9 +244,8 @@ def test_a_plugin_of_another_project_is_listed_and_runs(tmp_path: Path) -> None:
     )
     scenario = "my-family[distance=0.1,duration=0.2]"
     run = ("run", "--formulation", "my-formulation[gain=2]", "--scenario", scenario)
-    listed, ran = run_all(
-        tmp_path, [("list",), (*run, "--plant", "ideal", "--jobs", "1", "--out", "out")], path=site
-    )
+    how = ("--plant", "ideal", "--reference", "time", "--jobs", "1", "--out", "out")
+    listed, ran = run_all(tmp_path, [("list",), (*run, *how)], path=site)
     assert "my-formulation" in (listed / "stdout").read_text()
     assert "my-family" in (listed / "stdout").read_text()
     assert (ran / "code").read_text() == "null", (ran / "stderr").read_text()
@@ -280,7 +279,7 @@ def test_a_law_and_a_family_in_files_run_without_packaging(
     done = in_process(
         "run", "--formulation", law, "--formulation", f"{law}[gain=2]",
         "--scenario", "unpackaged_reach.py:Short[distance=0.02|0.1]",
-        "--plant", "ideal", "--out", "out",
+        "--plant", "ideal", "--reference", "time", "--out", "out",
     )  # fmt: skip
     assert done.exit_code == 0, done.output
     trials = pd.read_csv(tmp_path / "out" / "trials.csv")
@@ -298,7 +297,10 @@ def test_show_prints_one_thing_in_full(tmp_path: Path) -> None:
         assert expected in (folder / "stdout").read_text()
 
 
-SHORT = ("--formulation", "dls", "--scenario", "reach[duration=0.2]", "--plant", "ideal")
+SHORT = (
+    "--formulation", "dls", "--scenario", "reach[duration=0.2]", "--plant", "ideal",
+    "--reference", "time",
+)  # fmt: skip
 
 
 def test_time_and_status_work_on_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

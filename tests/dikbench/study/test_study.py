@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from dikbench.cli.listing import description
 from dikbench.errors import DikbenchError
@@ -87,7 +88,7 @@ def test_quick_covers_laws_families_and_solvers() -> None:
     solvers = [parse_solver(trial.solver) for trial in trials if str(trial.formulation) == "qp"]
     assert len({solver.name for solver in solvers}) == 6
     assert {solver.interface for solver in solvers} == {"cold", "warm"}
-    assert {str(trial.plant) for trial in trials} == {"ideal", "saturating"}
+    assert {trial.reference for trial in trials} == {"time", "path"}
 
 
 def test_a_law_without_solver_runs_once_whatever_solvers_are_named() -> None:
@@ -201,7 +202,7 @@ def test_a_bad_value_in_a_sweep_names_its_cell(axis: str, sweep: str, named: str
     """The whole study is refused, in one line that says which of its cells is wrong."""
     given = {"formulations": ("qp",), "scenarios": ("reach",), axis: (sweep,)}
     with pytest.raises(DikbenchError) as caught:
-        expand(select(load_study("quick"), Selection(**given), named=False))  # type: ignore[arg-type]
+        expand(select(load_study("quick"), replace(Selection(), **given), named=False))
     assert named in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -251,3 +252,10 @@ def test_a_study_is_what_its_description_says(name: str) -> None:
     assert {what: told[what] for what in numbers} == numbers
     everything = not set(plugins("formulation")) - formulations
     assert study.description.startswith("All") == everything
+
+
+@pytest.mark.parametrize("axis", ["formulations", "scenarios", "plants", "solvers"])
+def test_names_joined_by_a_comma_are_no_name(axis: str) -> None:
+    """A comma belongs into brackets: several are given one by one."""
+    with pytest.raises(DikbenchError, match=r"'dls,qp' is one name; valid: each .* on its own"):
+        select(load_study("quick"), replace(Selection(), **{axis: ("dls,qp",)}), named=False)

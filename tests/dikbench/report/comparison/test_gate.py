@@ -50,7 +50,11 @@ def test_a_trial_that_vanished_is_a_regression(folder: Callable[..., Path]) -> N
         1,
         "REGRESSED: 6 trials of A missing in B.",
     )
-    assert dikbench(a, b).exit_code == 0
+    ungated = dikbench(a, b)
+    assert (ungated.exit_code, first_line(ungated)) == (
+        0,
+        "B differs from A; without --tolerance nothing is judged.",
+    )
 
 
 def test_a_cell_that_was_skipped_in_a_may_be_missing(folder: Callable[..., Path]) -> None:
@@ -181,3 +185,23 @@ def test_what_is_no_longer_defined_hides_no_worse_number(folder: Callable[..., P
     names = [line.split("|")[1].strip() for line in lines]
     assert names.index("solver_failed_share") < names.index("verified_share")
     assert "nan" not in result.output
+
+
+def test_the_first_line_tells_a_few_and_counts_the_rest(folder: Callable[..., Path]) -> None:
+    """Five formulations fall in the setting that they have: three are named."""
+
+    def named(*fallen: int) -> Callable[[pd.DataFrame], pd.DataFrame]:
+        def change(table: pd.DataFrame) -> pd.DataFrame:
+            five = [
+                table.head(1).assign(formulation=f"law{number}", id=str(number), **OUTCOMES)
+                for number in range(5)
+            ]
+            return pd.concat(five, ignore_index=True).assign(
+                outcome=["left-path" if number in fallen else "success" for number in range(5)]
+            )
+
+        return change
+
+    line = first_line(dikbench(folder("a", named()), folder("b", named(*range(5))), *ANY))
+    assert line.count("success of") == 3
+    assert line.endswith("; 2 more like it.")
