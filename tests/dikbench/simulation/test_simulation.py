@@ -76,7 +76,8 @@ def test_a_path_indexed_reference_waits_for_a_slow_law(share: float) -> None:
     The twist that is wanted grows with what is left to do, so that the law is a little faster.
     """
     run = run_on_planar(lambda problem: share * exact(problem), mode="path")
-    assert 26 / share < run.trace.steps <= 30 / share
+    # The last twist leads to the end and not past it: who is slow takes a few more steps there.
+    assert 26 / share < run.trace.steps <= 31 / share
     moved = np.diff(run.trace.tau)
     assert np.all((moved > 0) & (moved < 0.01 + 1e-12))
 
