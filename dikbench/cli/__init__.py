@@ -13,7 +13,7 @@ import click
 
 from dikbench.cli.checking import check
 from dikbench.cli.one_line_errors import one_line_errors
-from dikbench.cli.reading_commands import compare, replay
+from dikbench.cli.reading_commands import compare, replay, table
 
 EXIT_CODE_OF_STANDSTILL = 3
 """Exit code of a run in which no trial of a formulation took a step."""
@@ -300,3 +300,4 @@ def show(name: str, figure: Path | None) -> None:
 commands.add_command(check)
 commands.add_command(compare)
 commands.add_command(replay)
+commands.add_command(table)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -104,6 +106,65 @@ def _compare_formulations(
         except OSError as error:
             raise DikbenchError(f"file {out}: {error.strerror or error}") from None
     click.echo(text)
+
+
+def _listed(_context: click.Context, _option: click.Parameter, value: str) -> list[str]:
+    """Split a text at commas that stand outside of brackets."""
+    return [part.strip() for part in re.split(r",(?![^\[]*\])", value) if part.strip()]
+
+
+@click.command()
+@click.argument("folder", metavar="RESULTS", type=click.Path(path_type=Path, file_okay=False))
+@click.option(
+    "--table",
+    "name",
+    default="success",
+    show_default=True,
+    metavar="NAME",
+    help="success, outcomes, tracking_error, limit_violation, timing or solvers.",
+)
+@click.option(
+    "--columns",
+    default="",
+    callback=_listed,
+    metavar="KEY,...",
+    help="Columns by their names in CSV, in this order; default: those that fit.",
+)
+@click.option(
+    "--formulations",
+    default="",
+    callback=_listed,
+    metavar="SELECTOR,...",
+    help="Formulations in this order; default: all.",
+)
+@click.option(
+    "--names",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="TOML with display names: tables [formulations], [solvers] and [columns].",
+)
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["latex", "markdown", "csv"]),
+    default="latex",
+    show_default=True,
+    help="LaTeX fits a column of a two-column paper (booktabs, graphicx, xcolor).",
+)
+@one_line_errors
+def table(
+    folder: Path,
+    name: str,
+    columns: list[str],
+    formulations: list[str],
+    names: Path | None,
+    form: Any,
+) -> None:
+    """Print a table of a results folder for a paper: chosen columns and formulations, own names."""
+    from dikbench.report.tables.chosen import chosen_table, read_display_names, written
+
+    display = None if names is None else read_display_names(names)
+    click.echo(written(chosen_table(folder, name, columns, formulations, display), form), nl=False)
 
 
 @click.command()

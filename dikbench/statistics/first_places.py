@@ -46,19 +46,20 @@ BROKEN: Final = frozenset(
 """Outcomes of trials in which a robot is stopped."""
 
 
-def dependable(trials: pd.DataFrame) -> set[Contender]:
-    """Find the formulations that may be first in a situation.
+def dependable(trials: pd.DataFrame, of_all_settings: pd.DataFrame) -> set[Contender]:
+    """Find the formulations that may be first in a situation of a setting.
 
     Args:
-        trials: the rows that count in a setting, of all situations.
+        trials: the rows that count in the setting, of all situations.
+        of_all_settings: those that count in any setting, over which it is counted who is stopped.
     """
     moving = trials[_asks_for_motion(trials)]
     if moving.empty:
         return set()
     overall = rates(moving, succeeded(moving))
-    told = ~trials["sees_constraints"].eq(0)
-    stopped = (trials["outcome"].isin(BROKEN) & told).groupby([trials[k] for k in CONTENDER])
-    share = stopped.mean()
+    told = ~of_all_settings["sees_constraints"].eq(0)
+    stopped = of_all_settings["outcome"].isin(BROKEN) & told
+    share = stopped.groupby([of_all_settings[name] for name in CONTENDER]).mean()
     rate_of = {
         contender: float(rate)
         for contender, rate, whole in zip(

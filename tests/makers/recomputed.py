@@ -103,8 +103,14 @@ def whole(rows: list[Row]) -> set[Contender]:
     return {name for name, of in by_contender(rows).items() if {case(r) for r in of} == cases}
 
 
-def may_be_first(rows: list[Row]) -> set[Contender]:
-    """Find who may be first, from the rows that count in a setting."""
+def may_be_first(trials: list[Row], setting: str) -> set[Contender]:
+    """Find who may be first in a setting; who is stopped is counted in both."""
+    rows = that_count(trials, setting)
+    everywhere = {(case(r), r["reference"], *contender(r)): r
+                  for each in ("time", "path") for r in that_count(trials, each)
+                  if number(r["judged_by_path"]) != 0}  # fmt: skip
+    at_rest = [r for r in that_count(trials, "path") if number(r["judged_by_path"]) == 0]
+    all_rows = [*everywhere.values(), *at_rest]
     reached: dict[tuple[str, str], float] = defaultdict(lambda: math.inf)
     for row in rows:
         largest = number(row["tracking_error_6d_max_m"])
@@ -119,11 +125,32 @@ def may_be_first(rows: list[Row]) -> set[Contender]:
     ]
     rates = {}
     for name in whole(moving) if moving else ():
-        own = by_contender(rows)[name]
+        own = by_contender(all_rows)[name]
         stopped = [row["outcome"] in BROKEN and number(row["sees_constraints"]) != 0 for row in own]
         if "oracle" not in name[0] and sum(stopped) <= 0.05 * len(own):
             rates[name] = rate(by_contender(moving)[name])
     return {name for name, value in rates.items() if value > 0.5 * max(rates.values())}
+
+
+def weights_of(rows: list[Row]) -> dict[tuple[str, str], float]:
+    """Weigh cases: families count the same, in each robots, in each scenarios, in each seeds."""
+    tree: Any = defaultdict(lambda: defaultdict(lambda: defaultdict(list)))
+    for key, row in {case(row): row for row in rows}.items():
+        tree[family(row)][row["robot"]][row["scenario"]].append(key)
+    return {
+        key: 1 / (len(robots) * len(scenarios) * len(seeds))
+        for robots in tree.values()
+        for scenarios in robots.values()
+        for seeds in scenarios.values()
+        for key in seeds
+    }
+
+
+def geometric(ratios: dict[tuple[str, str], float], rows: list[Row]) -> float:
+    """Compute the geometric mean of ratios of cases, weighed as in a rate."""
+    weights = weights_of(rows)
+    total = sum(weights[key] * math.log(ratio) for key, ratio in ratios.items())
+    return math.exp(total / sum(weights[key] for key in ratios))
 
 
 def drawn_differences(rows: list[Row], one: Contender, other: Contender) -> list[float]:
@@ -133,21 +160,15 @@ def drawn_differences(rows: list[Row], one: Contender, other: Contender) -> list
         The differences of the rates of one and the other, over the cases of both.
     """
     of = {name: {case(r): r for r in own} for name, own in by_contender(rows).items()}
+    weights = weights_of(rows)
     tree: Any = defaultdict(lambda: defaultdict(list))
-    robots: Any = defaultdict(lambda: defaultdict(lambda: defaultdict(int)))
+    differences = {}
     for key, row in {case(row): row for row in rows}.items():
         tree[family(row)][row["scenario"]].append(key)
-        robots[family(row)][row["robot"]][row["scenario"]] += 1
-    differences, weights = {}, {}
-    for name, inside in robots.items():
-        for scenarios in inside.values():
-            for scenario, seeds in scenarios.items():
-                for key in tree[name][scenario]:
-                    weights[key] = 1 / (len(inside) * len(scenarios) * seeds)
-                    pair = (of[one].get(key), of[other].get(key))
-                    if all(pair):
-                        values = [float(r["outcome"] in DONE) for r in pair if r]
-                        differences[key] = values[0] - values[1]
+        pair = (of[one].get(key), of[other].get(key))
+        if all(pair):
+            values = [float(r["outcome"] in DONE) for r in pair if r]
+            differences[key] = values[0] - values[1]
     draw = random.Random(3)
     means = []
     for _ in range(2000):

@@ -10,7 +10,6 @@ from typing import Any
 
 import pandas as pd
 
-from dikbench.metrics import METRICS
 from dikbench.report.contents.formulations_and_families import (
     Family,
     FormulationOfRun,
@@ -20,11 +19,8 @@ from dikbench.report.contents.formulations_and_families import (
 from dikbench.report.drawing.figure import Figure
 from dikbench.report.sentences.limitations import Limitation, limitations, missing
 from dikbench.report.sentences.summary import Summary, summarise
-from dikbench.report.tables.build import make_table
-from dikbench.report.tables.kinds import KINDS
+from dikbench.report.tables.every import make_tables
 from dikbench.report.tables.return_codes import return_codes
-from dikbench.report.tables.solver_axis import solver_axis
-from dikbench.report.tables.success import success_table
 from dikbench.report.tables.table import Table
 from dikbench.results.reading import Results
 
@@ -36,7 +32,7 @@ class Contents:
     Attributes:
         results: what it is about.
         summary: what a person reads first.
-        tables: success, tracking error, limit violation, timing, solvers.
+        tables: success, outcomes, tracking error, limit violation, timing, solvers.
         return_codes: a row per solver.
         families: the scenario families of the run.
         formulations: its formulations.
@@ -123,16 +119,10 @@ def gather(results: Results, figures: Sequence[Figure]) -> Contents:
         figures: what was drawn of them.
     """
     trials = results.trials
-    unknown = [name for name in METRICS if trials[name].isna().all()]
-    measured = trials.drop(columns=unknown).copy()  # columns lie apart after it
     return Contents(
         results,
         summarise(trials),
-        [
-            success_table(trials),
-            *(make_table(kind, measured) for kind in KINDS),
-            solver_axis(trials),
-        ],
+        make_tables(trials),
         return_codes(trials),
         families_of(trials),
         formulations_of(trials),

@@ -47,3 +47,10 @@ def judged_rows(trials: pd.DataFrame, setting: Setting) -> pd.DataFrame:
     """Return the rows that count in a setting, of the plant that is judged."""
     facts = with_facts(trials)
     return counted(facts[facts["plant"].eq(judged_plant(facts))], setting)
+
+
+def rows_of_all(of_setting: Mapping[Setting, pd.DataFrame]) -> pd.DataFrame:
+    """Return the rows that count in any setting, each once (targets at rest count in both)."""
+    every = pd.concat(of_setting.values())
+    found: pd.DataFrame = every[~every.index.duplicated()]
+    return found

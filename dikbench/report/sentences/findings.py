@@ -170,14 +170,14 @@ def most_accurate(part: pd.DataFrame, leading: Leaders, names: Names) -> Finding
     if common.sum() < 2:
         return None
     matrix[~common] = np.nan
-    best = int(np.nanmean(matrix, axis=0).argmin())
+    best = int(paired_means(matrix, found)[0].argmin())
     means, lower, _ = paired_means(matrix - matrix[:, [best]], found)
     behind = np.flatnonzero((lower > 0) & (means > np.log(NEARER)))
     if not len(behind):
         return None
     second = behind[means[behind].argmin()]
     together = np.flatnonzero(means < means[second])
-    medians = np.exp(np.nanmedian(matrix[:, together], axis=0))
+    medians = np.nanmedian(np.exp(matrix[:, together]), axis=0)
     low, high = number(1e3 * float(medians.min())), number(1e3 * float(medians.max()))
     text = (
         f"of these {names.of([leading.contenders[k] for k in together])}, "

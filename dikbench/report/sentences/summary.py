@@ -6,7 +6,13 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from dikbench.report.selection.judged import DEFINITIONS, SETTINGS, judged_plant, judged_rows
+from dikbench.report.selection.judged import (
+    DEFINITIONS,
+    SETTINGS,
+    judged_plant,
+    judged_rows,
+    rows_of_all,
+)
 from dikbench.report.sentences.findings import (
     Finding,
     broke_off,
@@ -77,9 +83,8 @@ def summarise(trials: pd.DataFrame) -> Summary:
         )
     names = Names(contenders)
     of_setting = {setting: judged_rows(trials, setting) for setting in SETTINGS}
-    candidates = {
-        setting: dependable(rows) if len(rows) else set() for setting, rows in of_setting.items()
-    }
+    every = rows_of_all(of_setting)
+    candidates = {setting: dependable(rows, every) for setting, rows in of_setting.items()}
     chapters = []
     firsts: list[tuple[Setting, tuple[Contender, ...]]] = []
     for situation, definition in DEFINITIONS.items():
@@ -105,9 +110,8 @@ def summarise(trials: pd.DataFrame) -> Summary:
         broke_off(contenders, names),
         unanswered(contenders, names),
     )
-    counted = pd.concat([rows["scenario"] for rows in of_setting.values()]).nunique()
     said = tuple(each for each in short if each)
-    return Summary(_basis(trials), said, tuple(chapters), int(counted))
+    return Summary(_basis(trials), said, tuple(chapters), every["scenario"].nunique())
 
 
 def _basis(trials: pd.DataFrame) -> str:

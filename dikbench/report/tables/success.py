@@ -18,6 +18,7 @@ from dikbench.report.selection.judged import (
     SETTINGS,
     judged_plant,
     judged_rows,
+    rows_of_all,
 )
 from dikbench.report.sentences.words import several
 from dikbench.report.tables.table import (
@@ -71,19 +72,20 @@ def success_table(trials: pd.DataFrame) -> Table:
         _overall("all", found),
         Column("trials", "trials", "number of trials that count", count=True),
     )
-    plant = judged_plant(trials)
+    plant, every = judged_plant(trials), rows_of_all(of_setting)
     blocks = [
-        Block(ALL, plant, setting, _rows(rows, situations, kinematic=CONSTRAINED in present))
-        for setting, rows in found.items()
+        Block(ALL, plant, setting, _rows(rows, candidates, situations))
+        for setting, rows, candidates in (
+            (setting, rows, dependable(rows, every)) for setting, rows in found.items()
+        )
     ]
     return Table("success", TITLE, columns, tuple(blocks), tuple(_notes(trials)), NO_OUTCOMES)
 
 
 def _rows(
-    rows: pd.DataFrame, situations: Sequence[Situation], *, kinematic: bool
+    rows: pd.DataFrame, candidates: set[Contender], situations: Sequence[Situation]
 ) -> tuple[TableRow, ...]:
     """Make the rows of a setting, one per formulation and solver."""
-    candidates = dependable(rows)
     overall = rates(rows, succeeded(rows), candidates)
     names: list[Contender] = list(overall.contenders.itertuples(index=False, name=None))
     cells: dict[Contender, list[TableCell]] = {name: [] for name in names}
@@ -98,7 +100,7 @@ def _rows(
         untold = () if situation != CONSTRAINED else [name for name in names if name not in told]
         _append(cells, found, first_places(part, found), untold)
     nobody = np.zeros(len(names), dtype=bool)
-    if kinematic:
+    if CONSTRAINED in situations:
         part = rows[~rows["situation"].eq(CONSTRAINED)]
         _append(cells, rates(part, succeeded(part), candidates), nobody)
     _append(cells, overall, nobody)

@@ -4,12 +4,6 @@ import re
 from pathlib import Path
 
 import pytest
-from makers.rows import make_rows
-
-from dikbench.plugins.building import make_scenario
-from dikbench.plugins.finding import plugins
-from dikbench.report.contents.docstring import parse_docstring
-from dikbench.report.contents.formulations_and_families import families_of, formulations_of
 from dikbench.report.selection.situations import (
     AT_LIMITS,
     CONSTRAINED,
@@ -22,6 +16,12 @@ from dikbench.report.selection.situations import (
     Situation,
     situation_of,
 )
+from makers.rows import make_rows
+
+from dikbench.plugins.building import make_scenario
+from dikbench.plugins.finding import plugins
+from dikbench.report.contents.docstring import parse_docstring
+from dikbench.report.contents.formulations_and_families import families_of, formulations_of
 
 FORMULATION = '''
 raise SystemExit("this file was run")

@@ -1,239 +1,200 @@
+"""What each sentence says, of rows that were made for it."""
+
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pandas as pd
 from hypothesis import given
 from hypothesis import strategies as st
-from makers.rows import make_rows
+from makers.rows import Values, make_rows
 
 from dikbench.report.sentences.findings import (
-    fail_most,
+    broke_off,
     fastest,
-    keep_limits,
-    keepers,
+    first_most_often,
+    leaders,
     most_accurate,
-    most_accurate_within_limits,
-    stay_on_course,
+    unanswered,
 )
-from dikbench.report.sentences.paired_wins import ROUNDING, SAME, lead
-from dikbench.report.sentences.words import Names, number
+from dikbench.report.sentences.words import FEW, Names, listed, number
 
-THREE = ("reach", "near-miss[miss=0.02]", "near-miss[miss=0.005]")
-TOO_FAST = {"velocity_violation_max_rad_s": 1.0, "velocity_peak_ratio": 3.0}
-
-
-def test_the_closest_law_is_named_with_its_number_and_the_next_one() -> None:
-    """The median, the runner-up and in how many trials it was behind stand in the sentence."""
-    rows = make_rows(
-        {
-            "far": {"position_error_rms_m": [0.004, 0.005, 0.001]},
-            "near": {"position_error_rms_m": [0.001, 0.002, 0.003]},
-        },
-        THREE,
-    )
-    text = most_accurate(rows, Names(rows)).text
-    assert "`near` with 2 mm (rms, median over 3 trials)" in text
-    assert "next is `far` with 4 mm, behind in 2 of 3" in text
-    assert "Every limit is kept" in text
+SCENARIOS = tuple(f"family{k % 6}[k={k}]" for k in range(24))
+FAILS: Values = {"outcome": ["left-path" if k % 3 else "success" for k in range(24)]}
 
 
-def test_laws_that_are_the_same_are_not_ranked() -> None:
-    """Values that differ by less than 1 % are a tie, whoever comes first."""
-    values = {"position_error_rms_m": 0.001}
-    alike = {"position_error_rms_m": 0.001 * (1 + SAME / 2)}
-    for contenders in (("a", "b"), ("b", "a")):
-        said = {"a": values, "b": alike}
-        rows = make_rows({name: said[name] for name in contenders}, THREE)
-        found = most_accurate(rows, Names(rows)).text
-        assert found.startswith(
-            " and ".join(f"`{name}`" for name in contenders) + ", not told apart,"
-        )
-        assert "next is" not in found
+def _rows(formulations: dict[Any, Values], reference: str = "path") -> pd.DataFrame:
+    return make_rows(formulations, SCENARIOS, reference=reference)
 
 
-def test_a_better_median_that_wins_too_few_trials_is_a_tie() -> None:
-    """One scenario that moves the median does not make a formulation the best."""
-    rows = make_rows(
-        {
-            "a": {"position_error_rms_m": [0.001, 0.002, 0.009]},
-            "b": {"position_error_rms_m": [0.0005, 0.003, 0.004]},
-        },
-        THREE,
-    )
-    assert "not told apart" in most_accurate(rows, Names(rows)).text
+def _all(rows: pd.DataFrame) -> set[tuple[str, str]]:
+    return {(f, s) for f, s in zip(rows["formulation"], rows["solver"], strict=True)}
 
 
-@given(
-    st.lists(
-        st.lists(st.floats(1e-6, 1.0), min_size=3, max_size=3),
-        min_size=2,
-        max_size=5,
-        unique_by=str,
-    )
-)
-def test_a_lead_is_what_it_says(values: list[list[float]]) -> None:
-    """Its value is the smallest median, and the runner-up loses twice as often as it wins."""
-    rows = pd.DataFrame(
-        [
-            {
-                "formulation": f"formulation{i}",
-                "solver": "none",
-                "scenario": s,
-                "seed": 0,
-                "error": value,
-            }
-            for i, contender in enumerate(values)
-            for s, value in zip(THREE, contender, strict=True)
-        ]
-    )
-    contenders = [(f"formulation{i}", "none") for i in range(len(values))]
-    found = lead(rows, "error", contenders)
+def _first(rows: pd.DataFrame, setting: Any = "path") -> str:
+    found = leaders(rows, setting, _all(rows), Names(rows))
     assert found is not None
-    medians = {contender: sorted(of)[1] for contender, of in zip(contenders, values, strict=True)}
-    assert found.value == min(medians.values())
-    assert min(medians, key=medians.__getitem__) in found.contenders
-    if found.runner_up is not None:
-        assert found.runner_up not in found.contenders
-        assert found.runner_up_value > found.value * (1 + SAME)
-        index = contenders.index(found.runner_up)
-        leader = values[contenders.index(min(medians, key=medians.__getitem__))]
-        clearly = [
-            (b - a > SAME * a + ROUNDING, a - b > SAME * b + ROUNDING)
-            for a, b in zip(leader, values[index], strict=True)
-        ]
-        wins, losses = (sum(column) for column in zip(*clearly, strict=True))
-        assert found.wins == wins >= 2 * losses
+    return f"{found.finding.question}: {found.finding.text}"
 
 
-def test_a_law_that_failed_or_whose_answers_are_wrong_leads_in_nothing() -> None:
-    """Of survivors nothing is said, nor of a solver whose claims the recheck denies."""
-    best, fair = {"position_error_rms_m": 1e-6}, {"position_error_rms_m": 0.01}
+def test_the_first_is_named_with_its_rate_and_the_next_one() -> None:
+    """Eight of 24 succeed with b: a third, 67 points less, give or take."""
+    text = _first(_rows({"a": {}, "b": FAILS}))
+    assert text.startswith(
+        "First where the path may wait: success of 24 cases (24 scenarios, 1 robot): "
+        "`a` with 100 %; next is `b` with 33.3 %, "
+    )
+    low, high = text.split("33.3 %, ")[1].split(" points less")[0].split(" to ")
+    assert 30 < float(low) < 66.7 < float(high) <= 100
+    assert text.endswith("Median time of what was done: the nominal duration.")
+
+
+def test_where_all_tie_nobody_stands_out() -> None:
+    """Whoever comes first; the rates are said."""
+    for names in (("a", "b"), ("b", "a")):
+        text = _first(_rows({name: {} for name in names}), "time")
+        assert text == (
+            "Nobody stands out where the clock does not wait: success of 24 cases (24 scenarios, "
+            "1 robot): all 2 that may be first have 100 %."
+        )
+
+
+def test_who_is_as_successful_and_slower_is_not_first() -> None:
+    """Twice the duration is; 2 % more is not."""
+    text = _first(_rows({"a": {}, "b": {"slow_down": 2.0}, "c": {"slow_down": 1.02}}))
+    assert "`a` and `c` with 100 %, not told apart." in text
+    assert "Median time of what was done: 1 to 1.02 times the nominal duration." in text
+
+
+def test_ties_end_where_somebody_can_be_told_apart() -> None:
+    """Who rarely differs but is worse than one that clearly does is not first."""
+    few = make_rows({"a": {}, "c": FAILS, "b": {}}, SCENARIOS)
+    part = few["formulation"].eq("b") & few["scenario_family"].eq("family0")
+    few.loc[part, "outcome"] = "late"
+    few.loc[few["formulation"].eq("c") & ~part, "outcome"] = "success"
+    found = leaders(few, "time", _all(few), Names(few))
+    assert found is not None
+    rates = dict(zip(found.found.contenders["formulation"], found.found.rate, strict=True))
+    apart = dict(zip(found.found.contenders["formulation"], found.found.upper < 0, strict=True))
+    least = max((rates[name] for name in rates if apart[name]), default=0.0)
+    assert all(rates[name] >= least for name, _ in found.contenders)
+
+
+def test_nobody_is_named_where_nobody_succeeds_or_may_be_first() -> None:
+    """No sentence, where nothing can be said."""
+    rows = _rows({"a": {"outcome": "late"}, "b": {"outcome": "late"}})
+    assert leaders(rows, "path", _all(rows), Names(rows)) is None
+    rows = _rows({"a": {}, "b": {}})
+    assert leaders(rows, "path", set(), Names(rows)) is None
+
+
+def test_who_is_not_told_of_obstacles_is_not_compared_there() -> None:
+    """A formulation that cannot see them is neither first nor next."""
+    rows = _rows({"a": {"sees_constraints": 1.0}, "b": {**FAILS, "sees_constraints": 0.0}})
+    text = _first(rows)
+    assert "`a` with 100 %." in text
+    assert "`b`" not in text
+
+
+def test_the_most_accurate_of_the_first_is_named_with_its_distance() -> None:
+    """Of trials that all of them did; the other is three times as far."""
+    rows = _rows({"a": {"contour_error_6d_max_m": 0.001}, "b": {"contour_error_6d_max_m": 0.003}})
+    found = leaders(rows, "path", _all(rows), Names(rows))
+    assert found is not None
+    said = most_accurate(rows, found, Names(rows))
+    assert said is not None
+    assert said.text == (
+        "of these `a`, 1 mm from the path at most (medians of 24 cases that all of them did; "
+        "angles count with 0.2 m); next is `b`, 3 times as far (geometric mean)."
+    )
+
+
+def test_distances_that_hardly_differ_are_not_ranked() -> None:
+    """3 % is no difference worth a sentence; nor is anything below a hundredth of a millimetre."""
+    for near, far in ((0.001, 0.00103), (1e-9, 1e-6)):
+        rows = _rows({"a": {"contour_error_6d_max_m": near}, "b": {"contour_error_6d_max_m": far}})
+        found = leaders(rows, "path", _all(rows), Names(rows))
+        assert found is not None
+        assert most_accurate(rows, found, Names(rows)) is None
+
+
+def test_targets_at_rest_say_nothing_of_accuracy() -> None:
+    """They have no path."""
+    rows = _rows(
+        {"a": {"contour_error_6d_max_m": 0.001}, "b": {"contour_error_6d_max_m": 0.003}}
+    ).assign(judged_by_path=0.0)
+    found = leaders(rows, "path", _all(rows), Names(rows))
+    assert found is not None
+    assert most_accurate(rows, found, Names(rows)) is None
+
+
+def test_who_broke_off_is_named_with_the_reasons() -> None:
+    """Every one of them; a skipped trial is none; nobody where all ran."""
     rows = make_rows(
         {
-            "survivor": {**best, "status": ["ok", "ok", "diverged"]},
-            ("qp", "wrong"): {**best, "not_verified_share": 0.5},
-            "fair": fair,
+            "a": {"status": ["timeout", "crashed", "skipped"],
+                  "outcome": ["did-not-run", "did-not-run", ""]},
+            "b": {"status": ["ok", "ok", "diverged"], "outcome": ["late", "success", "diverged"]},
+            "c": {},
         },
-        THREE,
+        SCENARIOS[:3],
+    )  # fmt: skip
+    found = broke_off(rows, Names(rows))
+    assert found is not None
+    assert found.text == (
+        "`a` in 2 of 2 trials (1 timeout and 1 crashed) and `b` in 1 of 3 trials (1 diverged)."
     )
-    names = Names(rows)
-    assert most_accurate(rows, names).text.startswith("`fair` with 10 mm")
-    assert keepers(rows) == [("fair", "none")]
-    missing = rows[~((rows["formulation"] == "fair") & (rows["scenario"] == "reach"))]
-    assert most_accurate(missing, names).text.startswith("No formulation in this run")
+    assert broke_off(rows[rows["formulation"].eq("c")], Names(rows)) is None
 
 
-def test_without_a_keeper_no_law_is_named() -> None:
-    """Where every law passes a limit the sentences say that none qualifies, and by how much."""
-    rows = make_rows({"a": TOO_FAST, "b": TOO_FAST}, THREE)
-    names = Names(rows)
-    assert (
-        keep_limits(rows, names).text
-        == "No formulation in this run keeps every limit in all 3 trials."
-    )
-    assert most_accurate_within_limits(rows, names).text.startswith("No formulation in this run")
-    assert "joint speeds reach 3 times their limit" in most_accurate(rows, names).text
-
-
-def test_a_solvers_tolerance_breaks_no_limit_and_more_does() -> None:
-    """Limits passed by less than 1e-4 are kept; one violation in one trial is one too many."""
-    tolerance = {"velocity_violation_max_rad_s": 9e-5, "position_violation_max_rad": 9e-5}
-    rows = make_rows(
-        {
-            "kept": tolerance,
-            "once": {"position_violation_max_rad": [0.0, 0.0, 1e-3]},
-            "hard": {"acceleration_violation_max_rad_s2": [0.0, 0.0, 1.0]},
-            "touches": {"distance_violation_max_m": [float("nan"), 2e-4, 0.0]},
-            "strains": {"torque_violating_share": [float("nan"), float("nan"), 0.01]},
-        },
-        THREE,
-    )
-    assert keepers(rows) == [("kept", "none")]
-
-
-def test_who_stays_on_course_and_who_of_them_gets_on() -> None:
-    """The course is kept within a degree; of those inside the limits the fastest is named."""
-    rows = make_rows(
-        {
-            "exact": TOO_FAST,
-            "slow": {"progress_mean": 0.4},
-            "less slow": {"progress_mean": 0.8, "direction_error_max_rad": math.radians(0.9)},
-            "astray": {"direction_error_max_rad": [0.0, 0.0, 1.0]},
-        },
-        THREE,
-    )
-    text = stay_on_course(rows, Names(rows)).text
-    assert "`exact`, `slow` and `less slow`: never more than 1 deg off" in text
-    assert "Within the limits `less slow` gets on best, at 80 %" in text
-    astray = rows[rows["formulation"] == "astray"]
-    assert (
-        "No formulation in this run stays within 1 deg" in stay_on_course(astray, Names(rows)).text
-    )
-
-
-def test_who_fails_most() -> None:
-    """By trials that broke off; where none did, by steps without an answer."""
-    rows = make_rows(
-        {"a": {"status": ["ok", "timeout", "crashed"]}, "b": {"status": ["ok", "ok", "timeout"]}},
-        THREE,
-    )
-    text = fail_most(rows, Names(rows)).text
-    assert text.startswith("`a`: 66.7 % of the trials (2 trials: ")
-    assert "1 timeout" in text
-    assert "1 crashed" in text
-    rows = make_rows({"a": {"infeasible_share": 0.25}, "b": {}}, THREE)
-    assert "No trial failed; `a` had no answer in up to 25 %" in fail_most(rows, Names(rows)).text
+def test_who_had_no_answer_is_named_with_the_largest_share() -> None:
+    """Infeasible steps and failures of the solver of a run together."""
     in_turns = {"infeasible_share": [0.9, 0.0, 0.0], "solver_failed_share": [0.05, 0.8, 0.0]}
-    rows = make_rows({"a": in_turns, "b": {}}, THREE)
-    assert "`a` had no answer in up to 95 %" in fail_most(rows, Names(rows)).text
-    rows = make_rows({"b": {}}, THREE)
-    assert fail_most(rows, Names(rows)).text == "No trial failed and every step was answered."
+    rows = make_rows({"a": in_turns, "b": {"infeasible_share": 0.2}, "c": {}}, SCENARIOS[:3])
+    found = unanswered(rows, Names(rows))
+    assert found is not None
+    assert found.text.startswith("`a` had no answer in up to 95 % of a run's steps")
+    assert unanswered(rows[rows["formulation"].eq("c")], Names(rows)) is None
 
 
-def test_who_fails_once_in_many_trials_is_named_alone() -> None:
-    """However small the share, of trials or of steps; who never failed is not among them."""
-    seeds = range(120)
-    rows = make_rows({"a": {}, "b": {}}, seeds=seeds)
-    rows.loc[rows["formulation"].eq("b") & rows["seed"].eq(7), "status"] = "timeout"
-    text = fail_most(rows, Names(rows)).text
-    assert text == "`b`: 0.833 % of the trials (1 trial: 1 timeout)."
-    rows = make_rows({"a": {"solver_failed_share": 0.002}, "b": {}, "c": {}}, seeds=seeds)
-    text = fail_most(rows, Names(rows)).text
-    assert "`a` had no answer in up to 0.2 % of a run's steps, and was slowed down" in text
-    rows = make_rows({"a": {"infeasible_share": 0.002}, "b": {"infeasible_share": 0.002}, "c": {}})
-    assert "`a` and `b` had no answer" in fail_most(rows, Names(rows)).text
-
-
-def test_a_skipped_trial_is_no_failure() -> None:
-    """It is neither counted as one nor among the trials."""
-    rows = make_rows(
-        {"a": {"status": ["timeout", "ok", "skipped"]}, "b": {"status": "skipped"}}, THREE
-    )
-    assert fail_most(rows, Names(rows)).text == "`a`: 50 % of the trials (1 trial: 1 timeout)."
-    rows = make_rows({"a": {"status": "skipped"}}, THREE)
-    assert fail_most(rows, Names(rows)).text == "No trial was run."
+def test_who_is_first_most_often() -> None:
+    """Counted where somebody stands out, in two situations at least."""
+    names = Names(make_rows({"a": {}, "b": {}}))
+    a, b = ("a", "none"), ("b", "none")
+    found = first_most_often([("path", (a, b)), ("path", (a,)), ("time", (b,))], names)
+    assert [(each.question, each.text) for each in found] == [
+        (
+            "First most often where the path may wait",
+            "`a`, alone or tied, in 2 of the 2 situations in which somebody stands out.",
+        )
+    ]
 
 
 def test_times_that_a_stable_cell_may_drift_apart_are_a_tie() -> None:
-    """Formulations within 25 % share the first place; unstable cells are counted beside it."""
-    times = {"a": 10.0, "b": 12.0, "c": 100.0}
+    """Formulations within the drift share the first place; the slowest is named, in ratios."""
+    times = {"a": 10.0, "b": 12.0, "c": 100.0, "d": 1.0}
     rows = make_rows(
         {
             name: {"formulation_time_median_us": t, "timing_stability": "stable"}
             for name, t in times.items()
         },
-        THREE,
+        SCENARIOS[:3],
     )
-    names = Names(rows)
-    text = fastest(rows, [("c", "none")], names).text
-    assert text.startswith("`a` and `b` take 10 to 12 us a call, which is not told apart")
-    assert "of those that keep every limit `c` takes 100 us a call" in text
-    assert "the slowest, `c`, takes 10 times as long" in text
-    assert "not stable" not in text
+    names, among = Names(rows), [("a", "none"), ("b", "none"), ("c", "none")]
+    found = fastest(rows, among, names)
+    assert found is not None
+    assert found.text == (
+        "`a` and `b`, 0.01 ms a call (not told apart: a stable time may drift by 25 %); the "
+        "slowest, `c`, takes 10 times as long (medians over 3 scenarios)."
+    )
     rows.loc[0, "timing_stability"] = "drift: a lot"
-    assert "Of 9 timed cells 1 are not stable" in fastest(rows, [], names).text
-    assert fastest(make_rows({"a": {}}), [], names).text == "No times were taken."
+    again = fastest(rows, among, names)
+    assert again is not None
+    assert "of 9 timed cells 1 cannot be trusted" in again.text
+    assert fastest(rows, among[:1], names) is None
+    assert fastest(rows, [], names) is None
+    assert fastest(make_rows({"a": {}, "b": {}}), among, names) is None
 
 
 def test_solvers_are_named_as_shortly_as_they_can() -> None:
@@ -247,6 +208,16 @@ def test_solvers_are_named_as_shortly_as_they_can() -> None:
     assert names.of(every) == "`qp` (all 4 solvers)"
     assert names.of(every[1:]) == "`qp` (all solvers but `daqp`)"
     assert names.of(every[:2]) == "`qp` (`daqp` and `osqp`)"
+
+
+@given(st.integers(1, 20))
+def test_at_most_six_names_are_listed(count: int) -> None:
+    """The rest is counted; nobody is lost."""
+    text = listed([f"`n{k}`" for k in range(count)])
+    named = text.count("`") // 2
+    assert named == min(count, FEW) <= 6
+    more = int(text.rsplit(" and ", 1)[1].split()[0]) if text.endswith("more") else 0
+    assert named + more == count
 
 
 @given(st.floats(1e-8, 1e8))

@@ -59,7 +59,13 @@ def test_one_seed_no_times_and_one_way_of_running_are_said() -> None:
         for reference in ("time", "path")
     ]
     everything = told(pd.concat(more))
-    for sentence in ("one seed", "No times", "with the clock", "The plant", "The reference `"):
+    for sentence in (
+        "one seed",
+        "No times",
+        "with the clock",
+        "The plant `saturating",
+        "The reference `",
+    ):
         assert sentence not in everything
     assert "The oracle, a measure" not in everything
 

@@ -11,6 +11,7 @@ from makers.made_up import made_up_study
 from dikbench.report.tables.build import make_table
 from dikbench.report.tables.files import write_table
 from dikbench.report.tables.kinds import KINDS
+from dikbench.report.tables.outcomes import outcome_table
 from dikbench.report.tables.solver_axis import solver_axis
 from dikbench.report.tables.success import success_table
 from dikbench.results.selected import with_selected
@@ -27,7 +28,7 @@ def made_up(tmp_path_factory: pytest.TempPathFactory, made_up_trials: pd.DataFra
     """The folder: trials.csv and tables/."""
     folder = tmp_path_factory.mktemp("made_up")
     made_up_study().to_csv(folder / "trials.csv", index=False)
-    every = [success_table(made_up_trials), solver_axis(made_up_trials)]
+    every = [table(made_up_trials) for table in (success_table, outcome_table, solver_axis)]
     for table in (*every, *(make_table(kind, made_up_trials) for kind in KINDS)):
         write_table(table, folder / "tables")
     return folder

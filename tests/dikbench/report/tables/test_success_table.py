@@ -76,7 +76,7 @@ def test_intervals_are_those_of_drawing_step_by_step(made_up: Path) -> None:
     checked = 0
     for setting in ("path", "time"):
         counted = recomputed.that_count(trials, setting)
-        may_be = recomputed.may_be_first(counted)
+        may_be = recomputed.may_be_first(trials, setting)
         for key in ("all_percent", "near_singularities_percent", "at_joint_limits_percent"):
             part = _parts(counted, key)
             groups = recomputed.by_contender(part)
@@ -112,7 +112,9 @@ def test_stars_are_of_who_may_be_first_and_is_neither_worse_nor_slower(
                 continue
             part = _parts(counted, column.key)
             unseen = {contender(row) for row in part if number(row["sees_constraints"]) == 0}
-            may_be = (recomputed.may_be_first(counted) & recomputed.whole(part)) - unseen
+            may_be = (
+                recomputed.may_be_first(trials, str(block.reference)) & recomputed.whole(part)
+            ) - unseen
             rows = {name: csv[(block.reference, *name)] for name in may_be}
             upper = {name: number(rows[name][f"{column.key}_upper"]) for name in may_be}
             rates = {name: number(rows[name][column.key]) for name in may_be}
@@ -136,7 +138,7 @@ def test_stars_are_of_who_may_be_first_and_is_neither_worse_nor_slower(
 def test_the_made_up_study_has_what_the_table_is_about(made_up: Path) -> None:
     """Who is careless, absent, blind or an oracle may not be first; slow ones are, by the clock."""
     trials = recomputed.read(made_up / "trials.csv")
-    by_clock = recomputed.may_be_first(recomputed.that_count(trials, "time"))
+    by_clock = recomputed.may_be_first(trials, "time")
     assert {"good", "twin", "slow[gain=0.5]", "blind"} <= {name for name, _ in by_clock}
     assert not {"careless", "absent", "oracle", "crashy"} & {name for name, _ in by_clock}
     assert ("fair", "daqp") in by_clock

@@ -8,6 +8,7 @@ import math
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -18,10 +19,19 @@ from hypothesis import strategies as st
 from dikbench.report.tables import latex_table, markdown
 from dikbench.report.tables.console import NAME, ROWS, WIDTH, to_text
 from dikbench.report.tables.csv_table import to_csv
+from dikbench.report.tables.every import make_tables
 from dikbench.report.tables.files import write_table
 from dikbench.report.tables.latex_table import to_latex, to_latex_per_family
 from dikbench.report.tables.markdown import markdown_blocks, markdown_rows, to_markdown
-from dikbench.report.tables.table import Block, Column, Table, TableCell, TableRow, shown
+from dikbench.report.tables.table import (
+    NOT_TOLD,
+    Block,
+    Column,
+    Table,
+    TableCell,
+    TableRow,
+    shown,
+)
 
 HOSTILE = (
     "<script>alert('x')</script>",
@@ -36,10 +46,10 @@ HOSTILE = (
 )
 
 COLUMNS = (
-    Column("failure_rate", "failure rate", "mean of: failures", "low", interval=True),
-    Column("failed", "failed", "number of: failures", count=True),
-    Column("trials", "trials", "number of: trials", count=True),
-    Column("error_m", "error [m]", "shifted mean of: <error>", "low", interval=True, shift=0.01),
+    Column("stopped_percent", "stopped [%]", "mean of: stopped", "low", interval=True, whole=True),
+    Column("hidden", "hidden", "number of: what stands in the CSV alone", count=True, shown=False),
+    Column("runs", "runs", "number of: trials", count=True),
+    Column("error_mm", "error [mm]", "median of: <error>", "low", interval=True),
     Column("speed_worst", "speed worst", "worst of: speed", "low"),
 )
 
@@ -92,43 +102,49 @@ def test_numbers_are_shown_to_three_digits(value: float, text: str) -> None:
 def test_markdown_marks_the_best_intervals_and_what_is_unstable() -> None:
     """Bold, brackets, a dagger; an interval that is the value itself is not repeated."""
     lines = markdown_blocks(PLAIN, PLAIN.overall).splitlines()
-    assert lines[0] == "ideal plant, time-indexed reference:"
-    assert _unescaped(lines[4])[2:] == ["0", "0", "8", "**0.0123** [0.0101, 0.0155]", "∞"]
-    assert _unescaped(lines[5])[2:] == ["0", "0", "8", "0.5", "12300†"]
-    assert _unescaped(lines[6])[2:] == ["0", "0", "8", "", "**-2.5e-07**†"]
+    assert lines[0] == "the clock does not wait (ideal plant):"
+    assert _unescaped(lines[4])[2:] == ["0", "8", "**0.0123** [0.0101, 0.0155]", "∞"]
+    assert _unescaped(lines[5])[2:] == ["0", "8", "0.5", "12300†"]
+    assert _unescaped(lines[6])[2:] == ["0", "8", "", "**-2.5e-07**†"]
     assert len({len(line) for line in lines[2:]}) == 1
 
 
-def test_latex_marks_the_best_intervals_and_what_is_unstable() -> None:
-    r"""\textbf, small brackets, \textcolor{gray}; exponents as powers, a minus as a minus."""
+def test_latex_marks_the_best_and_what_is_unstable() -> None:
+    r"""\textbf, \textcolor{gray}; exponents as powers, a minus as a minus; upright headings."""
     text = to_latex(PLAIN)
-    assert (
-        r"pinv & none & 0 & 0 & 8 & \textbf{0.0123} {\scriptsize[0.0101, 0.0155]} & $\infty$"
-        in text
-    )
-    assert r"qp & daqp & 0 & 0 & 8 & 0.5 & \textcolor{gray}{12300} \\" in text
-    assert (
-        r"lost & none & 0 & 0 & 8 &  & \textcolor{gray}{\textbf{\boldmath$-2.5 \times 10^{-7}$}} \\"
-        in text
-    )
+    assert r"pinv & 0 & 8 & \textbf{0.0123} & $\infty$ \\" in text
+    assert r"qp & 0 & 8 & 0.5 & \textcolor{gray}{12300} \\" in text
+    assert r"lost & 0 & 8 &  & \textcolor{gray}{\textbf{\boldmath$-2.5 \times 10^{-7}$}} \\" in text
     assert text.count(r"\begin{tabular}") == text.count(r"\end{tabular}") == 1
-    assert r"\shortstack[r]{failure rate} & " in text
-    assert to_latex_per_family(PLAIN).startswith(r"\noindent\textbf{reach}")
+    assert r"\rotatebox{90}{stopped {[}\%{]}} & " in text
+    assert r"{\bfseries reach}" in to_latex_per_family(PLAIN)
 
 
-def test_csv_holds_plain_numbers_their_bounds_and_shifts() -> None:
-    """In full, empty where there is none, whole where they are counts."""
+def test_latex_names_the_solver_where_there_are_several() -> None:
+    """And only there; who does not see obstacles has a dash."""
+    rows = [
+        _row("qp", "daqp", TableCell(1.0), TableCell(2.0)),
+        _row("qp", "osqp", TableCell(1.0, text=NOT_TOLD), TableCell(2.0)),
+        _row("lp", "highs", TableCell(1.0), TableCell(2.0)),
+    ]
+    text = to_latex(_table(rows))
+    assert "qp, daqp & 0 & 8 & 1 & 2" in text
+    assert r"qp, osqp & 0 & 8 & \textendash & 2" in text
+    assert "lp & 0 & 8 & 1 & 2" in text
+
+
+def test_csv_holds_plain_numbers_and_their_bounds() -> None:
+    """In full, empty where there is none, whole where they are counts, hidden columns too."""
     rows = list(csv.DictReader(io.StringIO(to_csv(PLAIN))))
     assert len(rows) == 6
     first = {
         "family": "all", "plant": "ideal", "reference": "time", "formulation": "pinv",
-        "solver": "none", "failure_rate": "0.0", "failure_rate_lower": "",
-        "failure_rate_upper": "", "failed": "0", "trials": "8", "error_m": "0.01234",
-        "error_m_lower": "0.0101", "error_m_upper": "0.0155", "error_m_shift": "0.01",
-        "speed_worst": "inf",
+        "solver": "none", "stopped_percent": "0.0", "stopped_percent_lower": "",
+        "stopped_percent_upper": "", "hidden": "0", "runs": "8", "error_mm": "0.01234",
+        "error_mm_lower": "0.0101", "error_mm_upper": "0.0155", "speed_worst": "inf",
     }  # fmt: skip
     assert rows[0] == first
-    assert (rows[2]["error_m"], rows[2]["speed_worst"]) == ("", "-2.5e-07")
+    assert (rows[2]["error_mm"], rows[2]["speed_worst"]) == ("", "-2.5e-07")
 
 
 def test_the_console_fits_a_screen() -> None:
@@ -147,19 +163,19 @@ def test_the_console_fits_a_screen() -> None:
     text = to_text(table)
     assert max(map(len, text.splitlines())) <= WIDTH
     assert 0 < text.count("formulation") < 2 * (ROWS + 2) + 4
-    assert text.count("and 28 more: tables/made_up.md") == 2
+    assert text.count("and 16 more: tables/made_up.md") == 2
     assert "(1): tables/made_up.md" in text
-    assert text.index("formulation00") < text.index("formulation01")  # the best first
+    assert text.index("formulation39") < text.index("formulation38")  # in the study's order
     assert "heading" in text
 
 
-def test_the_console_says_failures_out_of_trials_and_stars_the_best() -> None:
-    """A line per formulation."""
+def test_the_console_stars_the_first_and_rounds_shares() -> None:
+    """A line per formulation; a question mark after times that cannot be trusted."""
     lines = to_text(PLAIN).splitlines()
     assert lines[0] == "Made up"
-    assert re.fullmatch(r"pinv +0/8 +0\.0123\* +inf", lines[4])
-    assert re.fullmatch(r"qp, daqp +0/8 +0\.5 +12300\?", lines[5])
-    assert re.fullmatch(r"lost +0/8 +-2\.5e-07\?\*", lines[6])
+    assert re.fullmatch(r"pinv +0 +8 +0\.0123\* +inf", lines[5])
+    assert re.fullmatch(r"qp, daqp +0 +8 +0\.5 +12300\?", lines[6])
+    assert re.fullmatch(r"lost +0 +8 +-2\.5e-07\?\*", lines[7])
 
 
 def test_hostile_names_stay_text_in_markdown() -> None:
@@ -167,7 +183,7 @@ def test_hostile_names_stay_text_in_markdown() -> None:
     text = to_markdown(HARMFUL)
     rows = [line for line in text.splitlines() if line.startswith("|")]
     assert len(rows) == 2 * (2 + len(HOSTILE))
-    assert {len(_unescaped(row)) for row in rows} == {2 + len(COLUMNS)}
+    assert {len(_unescaped(row)) for row in rows} == {1 + len(COLUMNS)}
     assert "<" not in text
     assert ">" not in text
     assert "](" not in text
@@ -188,9 +204,9 @@ def test_hostile_names_in_a_plain_markdown_table() -> None:
 def test_hostile_names_stay_text_in_latex() -> None:
     """As many cells to a row as without them; no name is taken for an argument of a line's end."""
     text = to_latex(HARMFUL)
-    rows = [line for line in text.splitlines() if line.endswith(r"& 0 & 0 & 8 & 1 & 2 \\")]
+    rows = [line for line in text.splitlines() if line.endswith(r"& 0 & 8 & 1 & 2 \\")]
     assert len(rows) == len(HOSTILE)
-    assert {len(re.split(r"(?<!\\)&", row)) for row in rows} == {2 + len(COLUMNS)}
+    assert {len(re.split(r"(?<!\\)&", row)) for row in rows} == {len(COLUMNS)}
     assert not re.search(r"\\\\\s*\[", text)
     assert "{[}first{]}" in text
 
@@ -223,19 +239,47 @@ def test_any_name_is_one_cell_of_markdown(name: str) -> None:
     assert len(_unescaped(line)) == 2
 
 
+LONG = _table(
+    [
+        _row(
+            f"{'W' * 30}[gain={'0' * 20},after=scale]",
+            "daqp[then=clarabel]",
+            TableCell(-1.23e-30, best=True),
+            TableCell(-4.56e30, unstable=True),
+        ),
+        _row("a-b_" * 40, "none", TableCell(0.1), TableCell(1.0)),
+    ],
+    family="x" * 90,
+)
+
+
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="there is no pdflatex")
-def test_latex_is_set_by_latex(tmp_path: Path) -> None:
-    """Both files are taken in as they are, hostile names and all; names are printed as given."""
-    write_table(HARMFUL, tmp_path / "tables")
+def test_latex_fits_a_column(tmp_path: Path, made_up_trials: pd.DataFrame) -> None:
+    """Every table of a study, and names that mean harm: compiled, and no box is overfull."""
+    tables = [*make_tables(made_up_trials), HARMFUL, LONG]
+    inputs = []
+    for number, table in enumerate(tables):
+        write_table(replace(table, name=f"t{number}"), tmp_path / "tables")
+        for end in ("", "_per_family"):
+            inputs.append(f"\\noindent\\input{{tables/t{number}{end}.tex}}\\clearpage\n")
     document = (
-        "\\documentclass{article}\\usepackage{booktabs,xcolor}\\begin{document}\\tiny\n"
-        "\\input{tables/made_up.tex}\n\\input{tables/made_up_per_family.tex}\n\\end{document}\n"
+        "\\documentclass{article}\\usepackage{booktabs,graphicx,xcolor}\n"
+        "\\setlength{\\textwidth}{240pt}\\setlength{\\textheight}{5000pt}\\raggedbottom\n"
+        f"\\begin{{document}}\n{''.join(inputs)}\\end{{document}}\n"
     )
-    (tmp_path / "paper.tex").write_text(document)
+    (tmp_path / "paper.tex").write_text(document, encoding="utf-8")
     command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "paper.tex"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, errors="replace")
     assert done.returncode == 0, done.stdout[-2000:]
-    assert (tmp_path / "paper.pdf").stat().st_size > 1000
+    assert "Overfull \\hbox" not in done.stdout, done.stdout[-4000:]
+
+
+def test_latex_leaves_out_what_finds_no_room() -> None:
+    """Columns are taken from the first as long as they fit; at least the widest stay inside."""
+    wide = tuple(Column(f"c{i}", f"c{i}", "a number", "low") for i in range(30))
+    row = TableRow("a", "none", tuple(TableCell(1.23e-7) for _ in wide))
+    text = to_latex(Table("w", "W", wide, (Block("all", None, None, (row,)),), ()))
+    assert 3 <= text.count("rotatebox") < 10
 
 
 def test_names_on_the_console_are_one_short_line() -> None:

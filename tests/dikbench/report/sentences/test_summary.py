@@ -1,0 +1,273 @@
+"""The summary of a whole study: every number recomputed; straw laws change nothing."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+
+import pandas as pd
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+from makers import recomputed
+from makers.made_up import made_up_study
+from makers.recomputed import Row, case, contender
+from makers.rows import make_rows
+
+from dikbench.report.conclusions import conclusions
+from dikbench.report.sentences.summary import Summary, summarise
+from dikbench.report.sentences.words import number
+from dikbench.report.tables.success import success_table
+from dikbench.results.reading import read_results, without_attributes
+from dikbench.results.selected import with_selected
+
+SETTINGS = {"the path may wait": "path", "the clock does not wait": "time"}
+
+
+@pytest.fixture(scope="module", params=["a real run", "made-up trials"])
+def told(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Summary, pd.DataFrame, list[Row]]:
+    """A summary, the rows that it is of, and the same rows as texts."""
+    if request.param == "a real run":
+        folder: Path = request.getfixturevalue("results")
+        rows = without_attributes(read_results(folder, lenient=True)).trials
+    else:
+        folder = tmp_path_factory.mktemp("summary")
+        made_up_study().to_csv(folder / "trials.csv", index=False)
+        rows = with_selected(made_up_study())
+    return summarise(rows), rows, recomputed.read(folder / "trials.csv")
+
+
+def _solver_of(names: str, groups: dict[recomputed.Contender, list[Row]]) -> list[tuple[str, str]]:
+    """Every formulation that a list of names is of, with each of its solvers that is named."""
+    found = []
+    for name, _, solvers in re.findall(r"`([^`]+)`( \(([^)]*)\))?", names):
+        every = [pair for pair in groups if pair[0] == name]
+        listed = re.findall(r"`([^`]+)`", solvers)
+        if "but" in solvers:
+            found += [pair for pair in every if pair[1] not in listed]
+        else:
+            found += [pair for pair in every if not listed or pair[1] in listed]
+    return found
+
+
+def test_rates_and_samples_are_those_of_the_rows(
+    told: tuple[Summary, pd.DataFrame, list[Row]],
+) -> None:
+    """Cases, scenarios, robots, every rate, the points of who is next, the durations."""
+    summary, rows, trials = told
+    table, checked = success_table(rows), 0
+    for chapter in summary.chapters:
+        for finding in chapter.findings:
+            where = next((s for s in SETTINGS if finding.question.endswith(s)), "")
+            if not where:
+                continue
+            counted = recomputed.that_count(trials, SETTINGS[where])
+            part = [row for row in counted if row["situation"] == chapter.situation]
+            groups = recomputed.by_contender(part)
+            head, said = finding.text.split(": ", 1)
+            assert [int(n) for n in re.findall(r"\d+", head)] == [
+                len({case(row) for row in part}),
+                len({row["scenario"] for row in part}),
+                len({row["robot"] for row in part}),
+            ]
+            said, _, pace = said.partition(". Median time of what was done: ")
+            block = next(b for b in table.blocks if b.reference == SETTINGS[where])
+            place = [column.heading for column in table.columns].index(chapter.situation)
+            cells = {(row.formulation, row.solver): row.cells[place] for row in block.rows}
+            first = [name for name, cell in cells.items() if cell.best and not cell.text]
+            if "that may be first" in said:
+                rates = [100 * recomputed.rate(groups[name]) for name in first]
+                low, high = number(min(rates)), number(max(rates))
+                assert f"all {len(first)} that may be first have " in said
+                assert (f"{low} to {high} %" if low != high else f"have {high} %") in said
+                checked += 2
+            named = []
+            for names, share in re.findall(r"([^;]*?) with ([\d.e+-]+) %", said):
+                is_next = "next is" in names
+                for name in _solver_of(names, groups):
+                    assert number(100 * recomputed.rate(groups[name])) == share, finding
+                    if is_next:
+                        cell = cells[name]
+                        low, high = number(-cell.upper), number(-cell.lower)
+                        points = low if low == high else f"{low} to {high}"
+                        assert f"{share} %, {points} points less" in said
+                    else:
+                        named.append(name)
+                    checked += 1
+            assert set(named) <= set(first)
+            if pace:
+                medians = []
+                for name in first:
+                    done = [row for row in groups[name] if row["outcome"] in recomputed.DONE]
+                    durations = recomputed.defined(recomputed.number(r["slow_down"]) for r in done)
+                    medians += [median(durations)] if durations else []
+                said_pace = [float(n) for n in re.findall(r"\d[\d.]*", pace)] or [1.0]
+                ends = {number(min(medians)), number(max(medians))}
+                assert {number(value) for value in said_pace} == ends
+    assert checked >= 2
+
+
+def test_distances_are_those_of_the_rows(told: tuple[Summary, pd.DataFrame, list[Row]]) -> None:
+    """Medians over the cases that all of the first did, and the ratio of who is next."""
+    summary, rows, trials = told
+    table = success_table(rows)
+    for chapter in summary.chapters:
+        for finding in chapter.findings:
+            if finding.question != "Most accurate":
+                continue
+            counted = recomputed.that_count(trials, "path")
+            part = [row for row in counted if row["situation"] == chapter.situation]
+            block = next(b for b in table.blocks if b.reference == "path")
+            place = [column.heading for column in table.columns].index(chapter.situation)
+            first = {(r.formulation, r.solver) for r in block.rows if r.cells[place].best}
+            away: dict[recomputed.Contender, dict[tuple[str, str], float]] = {}
+            for row in part:
+                good = row["outcome"] in recomputed.DONE and float(row["judged_by_path"] or 0) == 1
+                if contender(row) in first and good:
+                    of = away.setdefault(contender(row), {})
+                    of[case(row)] = max(float(row["contour_error_6d_max_m"]), 1e-5)
+            common = set.intersection(*(set(of) for of in away.values()))
+            assert f"medians of {len(common)} cases" in finding.text
+            near, after = finding.text.split("next is ")
+            groups = recomputed.by_contender(part)
+            names = _solver_of(near, groups)
+            medians = [1e3 * median(away[name][key] for key in common) for name in names]
+            [millimetres] = re.findall(r"([\d.e-]+)(?: to ([\d.e-]+))? mm", near)
+            if "more" not in near:
+                said = {text for text in millimetres if text}
+                assert said == {number(min(medians)), number(max(medians))}
+            [second] = _solver_of(after.split(",")[0], groups)
+            ratios = {
+                name: recomputed.geometric(
+                    {key: away[second][key] / away[name][key] for key in common}, part
+                )
+                for name in away
+            }
+            assert number(max(ratios.values())) == after.split(", ")[1].split()[0]
+
+
+def test_scenarios_and_cases_of_the_basis(
+    told: tuple[Summary, pd.DataFrame, list[Row]],
+) -> None:
+    """How many cases there are on the ideal plant, and of how many a motion is known."""
+    summary, _, trials = told
+    facts = [row for row in recomputed.with_facts(trials) if row["plant"] == "ideal"]
+    cases = {case(row): row["feasible"] for row in facts}
+    known = sum(feasible in ("time", "path") for feasible in cases.values())
+    assert f"in the {known} of {len(cases)} cases" in summary.basis
+    counted = [*recomputed.that_count(trials, "time"), *recomputed.that_count(trials, "path")]
+    assert summary.scenarios == len({row["scenario"] for row in counted})
+
+
+def test_a_chapter_has_something_to_say(told: tuple[Summary, pd.DataFrame, list[Row]]) -> None:
+    """No heading without a sentence, and no sentence without a name or a number."""
+    for chapter in told[0].chapters:
+        assert chapter.findings
+        assert chapter.scenarios
+        for finding in chapter.findings:
+            assert re.search(r"\d|`", finding.text)
+            assert "nan" not in finding.text
+            assert finding.text.endswith(".")
+            assert not finding.text.endswith("..")
+
+
+def test_without_outcomes_nothing_is_concluded() -> None:
+    """Results of the first release: one sentence, and no star."""
+    rows = make_rows({"a": {}, "b": {"outcome": "late"}}).assign(
+        outcome="", feasible="", situation="", robot=""
+    )
+    said = conclusions(rows)
+    assert len(said) == 1
+    assert "nothing is concluded" in said[0]
+
+
+CASES = {
+    "line[k=1]": "free space", "line[k=2]": "free space", "bend[k=1]": "free space",
+    "fold[k=1]": "near singularities", "fold[k=2]": "near singularities",
+    "turn[k=1]": "near singularities", "edge[k=1]": "at joint limits",
+    "wall[k=1]": "obstacles or torques", "step[k=1]": "steps", "hold": "steps",
+}  # fmt: skip
+AT_REST = ("step[k=1]", "hold")
+OUTCOMES = st.sampled_from(["success", "success", "success", "left-path", "late", "limit-broken"])
+
+
+def _straw(outcome: Callable[[str], str], error: Callable[[str], float]) -> dict[str, list[object]]:
+    return {
+        "outcome": [outcome(scenario) for scenario in CASES],
+        "tracking_error_6d_max_m": [error(scenario) for scenario in CASES],
+        "slow_down": [0.5 for _ in CASES],
+        "contour_error_6d_max_m": [0.0 for _ in CASES],
+        "sees_constraints": [0.0 if s.startswith("wall") else float("nan") for s in CASES],
+    }
+
+
+def _at_start(scenario: str) -> float:
+    return 0.0 if scenario == "hold" else 0.3
+
+
+STRAWS = {
+    "Idle": _straw(lambda s: "success" if s == "hold" else "unfinished", _at_start),
+    "Creeper": _straw(lambda s: "success" if s == "hold" else "late", _at_start),
+    "Reckless": _straw(
+        lambda s: "success" if CASES[s] in ("free space", "steps") else "limit-broken", _at_start
+    ),
+    "Jittery": _straw(lambda s: "chattering" if s != "line[k=1]" else "limit-broken", _at_start),
+}
+
+
+@settings(
+    max_examples=8,
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow],
+    phases=[Phase.explicit, Phase.generate],
+)
+@given(
+    outcomes=st.lists(
+        st.lists(OUTCOMES, min_size=len(CASES), max_size=len(CASES)), min_size=2, max_size=4
+    ),
+    first=st.booleans(),
+    which=st.sets(st.sampled_from(sorted(STRAWS)), min_size=1),
+    setting=st.sampled_from(["path", "time"]),
+)
+def test_straw_laws_change_no_conclusion(
+    outcomes: list[list[str]], first: bool, which: set[str], setting: str
+) -> None:
+    """Whatever the others achieve, and in whichever order they stand: no sentence, no star."""
+    values = {
+        f"f{place}": {
+            "outcome": list(of),
+            "tracking_error_6d_max_m": [_at_start(s) for s in CASES],
+            "contour_error_6d_max_m": 1e-3 * (place + 1),
+        }
+        for place, of in enumerate(outcomes)
+    }
+
+    def made(of: dict[str, dict[str, object]]) -> pd.DataFrame:
+        rows = make_rows(of, list(CASES), seeds=(0, 1), reference=setting)
+        rows["situation"] = rows["scenario"].map(CASES)
+        at_rest = rows["scenario"].isin(AT_REST)
+        rows["judged_by_path"] = 1.0 - at_rest
+        rows.loc[at_rest, "reference"] = "time"
+        return rows
+
+    honest = made(values)
+    straws = made({f"straw.py:{name}": STRAWS[name] for name in sorted(which)})
+    together = pd.concat([straws, honest] if first else [honest, straws], ignore_index=True)
+    assert conclusions(together) == conclusions(honest)
+
+
+def test_the_property_would_notice(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without the bound on broken limits a reckless law is named."""
+    from dikbench.statistics import first_places
+
+    rows = make_rows(
+        {"a": {"outcome": "late"}, "Reckless": STRAWS["Reckless"]}, list(CASES), reference="path"
+    )
+    rows["situation"] = rows["scenario"].map(CASES)
+    assert not any("Reckless" in line for line in conclusions(rows))
+    monkeypatch.setattr(first_places, "MOST_BROKEN_SHARE", 1.0)
+    assert any("Reckless" in line for line in conclusions(rows))
