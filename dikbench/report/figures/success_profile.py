@@ -67,8 +67,10 @@ def draw_success_profiles(trials: pd.DataFrame, target: Path) -> list[Figure]:
 def _named(parts: list[pd.DataFrame]) -> list[tuple[str, str]]:
     """Choose who is named: who may be first, the most successful before the others."""
     worth: dict[tuple[str, str], float] = {}
+    together = pd.concat(parts)
+    of_all_settings = together[~together.index.duplicated()]
     for part in parts:
-        found, may_be = rates(part, succeeded(part)), dependable(part)
+        found, may_be = rates(part, succeeded(part)), dependable(part, of_all_settings)
         names = found.contenders.itertuples(index=False, name=None)
         for name, rate in zip(names, found.rate, strict=True):
             if name in may_be:
