@@ -96,7 +96,7 @@ def run_study(study: Study, out: Path, settings: RunSettings, command: str) -> R
         run = store.begin_run(manifest(study, len(planned), own), planned)
         if hides := store.hidden() - hidden:
             print(
-                f"{hides} rows whose formulation or scenario has changed are kept and not shown",
+                f"kept and not shown, of other sources than today: {hides} of the rows",
                 file=sys.stderr,
             )
         done, positions = store.statuses(), {p.id: number for number, p in enumerate(planned)}

@@ -71,14 +71,19 @@ class Contents:
         trials = self.results.trials
         status = trials["status"]
         formulations = trials[["formulation", "solver"]].drop_duplicates()
+        seeds, scenarios = trials["seed"].nunique(), trials["scenario"].nunique()
+        one = len(formulations) == 1
         found = [
-            (len(trials), "trials"),
+            (len(trials), "trial" if len(trials) == 1 else "trials"),
             (int((~status.isin(["ok", "skipped"])).sum()), "failed"),
             (int(status.eq("skipped").sum()), "skipped"),
             (missing(trials, self.manifest), "missing"),
-            (len(formulations), "formulations with their solvers"),
-            (trials["scenario"].nunique(), "scenarios"),
-            (trials["seed"].nunique(), "seeds" if trials["seed"].nunique() > 1 else "seed"),
+            (
+                len(formulations),
+                "formulation with its solver" if one else "formulations with their solvers",
+            ),
+            (scenarios, "scenario" if scenarios == 1 else "scenarios"),
+            (seeds, "seed" if seeds == 1 else "seeds"),
         ]
         return [(count, what) for count, what in found if count or what in {"trials", "failed"}]
 

@@ -19,6 +19,9 @@ from dikbench.statistics.stability import STABLE
 from dikbench.statistics.trial_matrix import CONTENDER
 from dikbench.study.plan import ways_of
 
+FEW_SCENARIOS: Final = 2
+"""More scenarios than this (and one) are counted, not listed."""
+
 WORTH_SAYING: Final = 0.01
 """A share of steps above this is remarked upon."""
 
@@ -186,12 +189,13 @@ def _broken(trials: pd.DataFrame) -> list[Limitation]:
 
 
 def _reasons(rows: pd.DataFrame, what: str) -> tuple[str, ...]:
-    """How often each status and message occurs, and with which formulations."""
+    """Say how often each status and message occurs, with which formulations and scenarios."""
     cases = []
     for (status, message), part in rows.groupby(["status", "message"], sort=False):
         contenders = part[CONTENDER].drop_duplicates().itertuples(index=False, name=None)
         names = listed([_named(*contender) for contender in contenders])
-        cases.append(f"{several(len(part), what)} {status}: {message} ({names}).")
+        scenarios = listed([quoted(text) for text in part["scenario"].unique()], most=FEW_SCENARIOS)
+        cases.append(f"{several(len(part), what)} {status}: {message} ({names}; on {scenarios}).")
     return tuple(cases)
 
 

@@ -90,7 +90,7 @@ def test_rows_of_another_source_are_hidden_outside_of_the_plan_too(
     others = [(name, scenario) for name in ("pinv", "qp") for scenario in (first, second)]
     assert shown(copy) == [("dls", first), *others]
     told = capsys.readouterr().err
-    assert "2 rows whose formulation or scenario has changed are kept and not shown" in told
+    assert "kept and not shown, of other sources than today: 2 of the rows" in told
     with sqlite3.connect(copy / "results.sqlite") as database:
         assert database.execute("SELECT COUNT(*) FROM trials").fetchone() == (7,)
     execute(copy, "UPDATE trials SET id = substr(id, 8) WHERE scenario LIKE '%0.2%'")
