@@ -111,7 +111,7 @@ def _expected(key: str, rows: list[Row], times: bool) -> float:
         place = max(math.ceil((1 - share) * len(ordered) - 1e-9), 1)
     else:
         place = max(math.ceil(share * len(ordered) - 1e-9), 1)
-    return factor * ordered[place - 1]
+    return float(factor * ordered[place - 1])
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
