@@ -94,7 +94,7 @@ def _expected(key: str, rows: list[Row], times: bool) -> float:
     if key == "scenarios":
         return len(timed)
     if key == "unstable":
-        return sum(row["timing_stability"] != "stable" for row in timed)
+        return float(sum(row["timing_stability"] != "stable" for row in timed))
     quantity, statistic = _split(key)
     more = quantity in MORE_IS_BETTER
     column, factor, worst = {**QUANTITIES, **MORE_IS_BETTER}[quantity]
