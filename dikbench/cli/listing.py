@@ -21,7 +21,7 @@ from dikbench.plugins.finding import (
     plugins,
     scenario_plugin,
 )
-from dikbench.report.tables.kinds import kinds_with
+from dikbench.report.tables.every import tables_with
 from dikbench.robots.catalogue import ROBOTS, load_robot
 from dikbench.scenario.oracle import ORACLE, ORACLES, SLOWED_ORACLE
 from dikbench.scenario.plant import PLANTS
@@ -278,7 +278,7 @@ def _robot(name: str) -> str:
 
 def _metric(name: str) -> str:
     metric = METRICS[name]
-    tables = ", ".join(kind.name for kind in kinds_with(name))
+    tables = ", ".join(tables_with(name))
     return "\n".join(
         [
             f"{name}: {metric.definition}",

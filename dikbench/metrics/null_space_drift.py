@@ -29,7 +29,12 @@ def null_space_drift(motion: Motion) -> float:
     tau, period = motion.trace.tau, reference.period
     # The last step of a run ends within half a control period of its nominal end, or the target
     # rests there already.
-    whole = min(float(tau[-1]), reference.duration) + 0.5 * motion.trace.dt - reference.first_lap - period
+    whole = (
+        min(float(tau[-1]), reference.duration)
+        + 0.5 * motion.trace.dt
+        - reference.first_lap
+        - period
+    )
     if not whole >= 0 or len(robot.chain) <= len(motion.scenario.rows):
         return float("nan")
     count = floor(whole / period * PHASES_PER_LAP) + 1

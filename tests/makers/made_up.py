@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -10,7 +11,7 @@ import pandas as pd
 from makers.recomputed import outcome_at
 from makers.rows import FAULTLESS
 
-SCENARIOS: Final = {
+SCENARIOS: Final[Mapping[str, Mapping[str, Any]]] = {
     **{
         f"line[robot={robot},k={k}]": {"situation": "free space", "robot": robot}
         for robot, k in (("ur5", 1), ("ur5", 2), ("panda", 1))
@@ -48,7 +49,7 @@ CONTENDERS: Final = (
 def made_up_study() -> pd.DataFrame:
     """Make the rows of the study, always the same ones, with the columns of trials.csv."""
     random = np.random.default_rng(7)
-    rows = []
+    rows: list[dict[str, Any]] = []
     for place, (formulation, solver) in enumerate(CONTENDERS):
         name = formulation.split("[")[0]
         for scenario, facts in SCENARIOS.items():

@@ -29,7 +29,7 @@ DEFINITIONS: Final[Mapping[Situation, str]] = MappingProxyType(
         "beyond joint speed": "the exact motion needs more than a joint's speed limit, away from "
         "limits and singularities",
         "free space": "the exact motion keeps every limit, away from limits and singularities",
-        "steps": "the target does not move, or jumps",
+        "steps": "the target jumps, so that no motion can stay at it",
         "start outside": "the start is outside a position limit",
         CONSTRAINED: "distances from obstacles, between links, or torques are limited",
     }

@@ -196,8 +196,3 @@ TIMING: Final = TableKind(
 )  # fmt: skip
 
 KINDS: Final = (TRACKING_ERROR, LIMIT_VIOLATION, TIMING)
-
-
-def kinds_with(column: str) -> list[TableKind]:
-    """Return the tables in which a column of the trials stands."""
-    return [kind for kind in KINDS if any(each.of == column for each in kind.quantities)]

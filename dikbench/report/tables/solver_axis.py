@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import nan
+from typing import Final
 
 import pandas as pd
 
@@ -13,6 +14,17 @@ from dikbench.statistics.failures import ran
 from dikbench.statistics.success import rates, succeeded
 from dikbench.statistics.trial_matrix import CONTENDER
 from dikbench.study.trial import NO_SOLVER
+
+SOLVERS: Final = "solvers"
+"""Name of the table."""
+
+SHOWN: Final = (
+    "solver_failed_share",
+    "not_verified_share",
+    "primal_residual_max_rad_s",
+    "optimum_distance_max_rad_s",
+)
+"""Metrics that stand in it, in the order of its columns."""
 
 COLUMNS = (
     Column("runs", "runs", "number of runs, of any plant and reference", count=True),
@@ -64,7 +76,7 @@ def solver_axis(trials: pd.DataFrame) -> Table:
     ]
     blocks = (Block(ALL, None, None, tuple(made)),) if made else ()
     notes = ("All runs count. Times are those of the timing pass.",)
-    return Table("solvers", "Solvers on the same formulations", COLUMNS, blocks, notes)
+    return Table(SOLVERS, "Solvers on the same formulations", COLUMNS, blocks, notes)
 
 
 def _cells(part: pd.DataFrame, success: float) -> tuple[TableCell, ...]:
@@ -78,10 +90,8 @@ def _cells(part: pd.DataFrame, success: float) -> tuple[TableCell, ...]:
     numbers = (
         len(part),
         PERCENT * success,
-        of_all_steps("solver_failed_share"),
-        of_all_steps("not_verified_share"),
-        part["primal_residual_max_rad_s"].max(),
-        part["optimum_distance_max_rad_s"].max(),
+        *map(of_all_steps, SHOWN[:2]),
+        *(part[column].max() for column in SHOWN[2:]),
         MS * times["formulation_time_median_us"].median(),
         MS * times["formulation_time_p99_us"].median(),
     )

@@ -8,7 +8,7 @@ from click.testing import CliRunner
 from makers.rows import make_rows, write_results
 
 from dikbench.cli import commands
-from dikbench.metrics import METRICS
+from dikbench.metrics import METRICS, OUTCOME_NUMBERS, OUTCOME_TEXTS
 from dikbench.report.write import write_report
 
 
@@ -45,17 +45,20 @@ def test_a_folder_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
 SCENARIOS = ("reach", "near-miss[miss=0.02]")
 
 
+BROKEN = {"ok": "success", "skipped": ""}
+
+
 @pytest.mark.parametrize(
     ("statuses", "said"),
     [
-        ({"pinv": ["ok", "ok"], "dls": ["ok", "ok"]}, "No trial failed"),
-        ({"pinv": ["ok", "ok"], "dls": ["ok", "timeout"]}, "`dls`: 50 % of the trials"),
-        ({"pinv": ["crashed", "timeout"], "dls": ["timeout", "crashed"]}, "100 % of the trials"),
+        ({"pinv": ["ok", "ok"], "dls": ["ok", "ok"]}, "that a known motion can do"),
+        ({"pinv": ["ok", "ok"], "dls": ["ok", "timeout"]}, "`dls` in 1 of 2 trials (1 timeout)"),
+        ({"pinv": ["crashed", "timeout"], "dls": ["timeout", "crashed"]}, "`pinv` in 2 of 2"),
         ({"pinv": ["skipped", "skipped"], "dls": ["skipped", "skipped"]}, "No formulation was run"),
-        ({"pinv": ["timeout", "skipped"], "dls": ["ok", "skipped"]}, "`pinv`: 100 % of the trials"),
-        ({"dls": ["ok", "ok"]}, "No trial failed"),
-        ({"dls": ["ok", "crashed"]}, "`dls`: 50 % of the trials"),
-        ({"dls": ["crashed", "crashed"]}, "`dls`: 100 % of the trials"),
+        ({"pinv": ["timeout", "skipped"], "dls": ["ok", "skipped"]}, "`pinv` in 1 of 1 trials"),
+        ({"dls": ["ok", "ok"]}, "that a known motion can do"),
+        ({"dls": ["ok", "crashed"]}, "`dls` in 1 of 2 trials (1 crashed)"),
+        ({"dls": ["crashed", "crashed"]}, "`dls` in 2 of 2 trials (2 crashed)"),
         ({"dls": ["skipped", "skipped"]}, "No formulation was run"),
     ],
 )
@@ -64,10 +67,26 @@ def test_a_report_is_made_whatever_failed(
 ) -> None:
     """Of no, one and all trials failed or skipped, of two formulations and of one."""
     rows = make_rows({name: {"status": status} for name, status in statuses.items()}, SCENARIOS)
+    rows["outcome"] = [BROKEN.get(status, "did-not-run") for status in rows["status"]]
     rows.loc[rows["status"].ne("ok"), list(METRICS)] = np.nan
     folder = write_results(tmp_path / "out", rows)
     write_report(folder)
     assert said in (folder / "report.md").read_text()
+
+
+def test_results_without_outcomes_have_a_report_that_concludes_nothing(tmp_path: Path) -> None:
+    """As the first release committed them: one sentence says so, and nothing is starred."""
+    rows = make_rows({"pinv": {}, "dls": {}}, SCENARIOS).drop(
+        columns=[*OUTCOME_TEXTS, *OUTCOME_NUMBERS, "slow_down", "contour_error_6d_max_m"]
+    )
+    folder = write_results(tmp_path / "out", rows)
+    printed = write_report(folder)
+    text = (folder / "report.md").read_text()
+    assert "nothing is concluded from them" in text
+    assert "Nothing can be said of success" in text
+    assert "Nothing can be said of success" in printed
+    assert "First" not in text
+    assert "**" not in text.partition("## Tracking error")[2].partition("## Limitations")[0]
 
 
 def test_a_report_is_made_where_plant_and_reference_were_not_crossed(tmp_path: Path) -> None:
@@ -77,4 +96,4 @@ def test_a_report_is_made_where_plant_and_reference_were_not_crossed(tmp_path: P
     rows.loc[half, "plant"], rows.loc[half, "reference"] = "saturating", "time"
     folder = write_results(tmp_path / "out", rows)
     write_report(folder)
-    assert "the ideal plant" in (folder / "report.md").read_text()
+    assert "Success on the ideal plant" in (folder / "report.md").read_text()

@@ -4,24 +4,13 @@ import re
 from pathlib import Path
 
 import pytest
-from dikbench.report.selection.situations import (
-    AT_LIMITS,
-    CONSTRAINED,
-    FREE,
-    OUTSIDE,
-    SINGULAR,
-    TOO_FAST,
-    UNKNOWN,
-    UNREACHABLE,
-    Situation,
-    situation_of,
-)
 from makers.rows import make_rows
 
 from dikbench.plugins.building import make_scenario
 from dikbench.plugins.finding import plugins
 from dikbench.report.contents.docstring import parse_docstring
 from dikbench.report.contents.formulations_and_families import families_of, formulations_of
+from dikbench.scenario.situation import Situation
 
 FORMULATION = '''
 raise SystemExit("this file was run")
@@ -127,23 +116,21 @@ def test_families_say_what_they_certify() -> None:
 @pytest.mark.parametrize(
     ("scenario", "situation"),
     [
-        ("obstacle[where=elbow]", CONSTRAINED),
-        ("torque-limited", CONSTRAINED),
-        ("reach", UNREACHABLE),
-        ("workspace-boundary", UNREACHABLE),
-        ("start-outside", OUTSIDE),
-        ("joint-limit-crossing", AT_LIMITS),
-        ("joint-limit-approach", AT_LIMITS),
-        ("near-miss[miss=0.02]", SINGULAR),
-        ("near-miss[miss=0.2]", FREE),
-        ("speed-sweep[speed=1.3]", TOO_FAST),
-        ("speed-sweep[speed=0.7]", FREE),
-        ("back-and-forth", FREE),
-        ("unheard-of", UNKNOWN),
+        ("obstacle[where=elbow]", "obstacles or torques"),
+        ("torque-limited", "obstacles or torques"),
+        ("step", "steps"),
+        ("hold-still", "free space"),
+        ("start-outside", "start outside"),
+        ("joint-limit-crossing", "at joint limits"),
+        ("joint-limit-approach", "at joint limits"),
+        ("near-miss[miss=0.02]", "near singularities"),
+        ("near-miss[miss=0.2,speed=0.1]", "free space"),
+        ("speed-sweep[speed=1.3]", "beyond joint speed"),
+        ("speed-sweep[speed=0.7]", "free space"),
     ],
 )
 def test_scenarios_are_what_their_joint_motion_asks_for(
     scenario: str, situation: Situation
 ) -> None:
     """The situation is measured and not read off a name: a wide miss is free space."""
-    assert situation_of(scenario, 0) is situation
+    assert make_scenario(scenario).situation == situation

@@ -70,7 +70,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "timing_stability": "stable",
     }
     formulations: dict[str | tuple[str, str], Values] = {
-        "pinv": {"position_error_rms_m": [0.003, 0.02, 0.1], **times},
+        "pinv": {"outcome": ["success", "late", "left-path"], **times},
         "dls[damping=0.1]": {"position_error_rms_m": 0.02, **times, "timing_stability": "drift"},
         ("qp", "daqp"): {
             "position_error_rms_m": 1e-5,
@@ -80,6 +80,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
         },
         HOSTILE: {
             "status": ["ok", "formulation-error", "ok"],
+            "outcome": ["success", "did-not-run", "success"],
             "message": f"RuntimeError: {HOSTILE}",
         },
     }
@@ -159,13 +160,29 @@ def test_every_figure_is_within_and_described(report: Path) -> None:
 
 
 def test_the_best_is_marked_and_unstable_times_are_greyed(report: Path) -> None:
-    """The star stands at the formulation with the smallest error, the tilde at times that drift."""
+    """Stars stand at who may be first, alone in the table of success; a tilde at drifting times."""
     text = (report / "report.html").read_text(encoding="utf-8")
     rows = re.findall(r'<tr><th scope="row" class="name">(.*?)</th>(.*?)</tr>', text)
-    assert any(name == "qp" and "class=best" in cells.replace('"', "") for name, cells in rows)
+    starred = {name for name, cells in rows if "class=best" in cells.replace('"', "")}
+    assert starred == {"qp", "dls[damping=0.1]"}
     unstable = {name for name, cells in rows if "unstable" in cells}
     assert unstable == {"dls[damping=0.1]"}
-    assert 'class="bad"' in text  # the formulation that failed
+
+
+def test_success_stands_first(report: Path) -> None:
+    """In both pages, outcomes next; then the tables of all runs, and the solvers."""
+    titles = (
+        "Success: ",
+        "Outcomes: ",
+        "Tracking error: ",
+        "Limit violation: ",
+        "Timing",
+        "Solvers",
+    )
+    for file, mark in (("report.html", "<h3>"), ("report.md", "## ")):
+        text = (report / file).read_text(encoding="utf-8")
+        places = [text.index(mark + title) for title in titles]
+        assert places == sorted(places)
 
 
 def test_families_and_laws_are_described(report: Path) -> None:
@@ -195,7 +212,7 @@ def test_the_markdown_says_the_same(report: Path) -> None:
     assert "<img" not in outside
     for heading in ("Which formulation for which situation", "Limitations", "How it was made"):
         assert f"## {heading}" in text
-    assert "Most accurate" in text
+    assert "First where" in text or "Nobody stands out where" in text
     for figure in (report / "figures").glob("*.svg"):
         assert f"(figures/{figure.name})" in text
     lines = text.split("\n")

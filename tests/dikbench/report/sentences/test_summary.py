@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from makers import recomputed
 from makers.made_up import made_up_study
 from makers.recomputed import Row, case, contender
-from makers.rows import make_rows
+from makers.rows import Values, make_rows
 
 from dikbench.report.conclusions import conclusions
 from dikbench.report.sentences.summary import Summary, summarise
@@ -237,7 +237,7 @@ def test_straw_laws_change_no_conclusion(
     outcomes: list[list[str]], first: bool, which: set[str], setting: str
 ) -> None:
     """Whatever the others achieve, and in whichever order they stand: no sentence, no star."""
-    values = {
+    values: dict[str | tuple[str, str], Values] = {
         f"f{place}": {
             "outcome": list(of),
             "tracking_error_6d_max_m": [_at_start(s) for s in CASES],
@@ -246,7 +246,7 @@ def test_straw_laws_change_no_conclusion(
         for place, of in enumerate(outcomes)
     }
 
-    def made(of: dict[str, dict[str, object]]) -> pd.DataFrame:
+    def made(of: dict[str | tuple[str, str], Values]) -> pd.DataFrame:
         rows = make_rows(of, list(CASES), seeds=(0, 1), reference=setting)
         rows["situation"] = rows["scenario"].map(CASES)
         at_rest = rows["scenario"].isin(AT_REST)

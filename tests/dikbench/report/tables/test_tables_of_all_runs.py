@@ -94,7 +94,7 @@ def _expected(key: str, rows: list[Row], times: bool) -> float:
     if key == "scenarios":
         return len(timed)
     if key == "unstable":
-        return sum(row["timing_stability"] != "stable" for row in timed)
+        return float(sum(row["timing_stability"] != "stable" for row in timed))
     quantity, statistic = _split(key)
     more = quantity in MORE_IS_BETTER
     column, factor, worst = {**QUANTITIES, **MORE_IS_BETTER}[quantity]
@@ -111,7 +111,7 @@ def _expected(key: str, rows: list[Row], times: bool) -> float:
         place = max(math.ceil((1 - share) * len(ordered) - 1e-9), 1)
     else:
         place = max(math.ceil(share * len(ordered) - 1e-9), 1)
-    return factor * ordered[place - 1]
+    return float(factor * ordered[place - 1])
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
