@@ -25,7 +25,10 @@ def test_each_limitation_is_said_where_it_applies_and_only_there() -> None:
             "status": ["timeout", "ok"], "message": "not finished after 4 s",
         },
         "2 cells could not run": {"status": "skipped", "message": "it cannot"},
-        "2 cells skipped: it cannot (`a`; on `reach` and `near-miss`).": {"status": "skipped", "message": "it cannot"},
+        "2 cells skipped: it cannot (`a`; on `reach` and `near-miss`).": {
+            "status": "skipped",
+            "message": "it cannot",
+        },
         "`a`: in up to 20 % of a run's steps.": {"not_verified_share": [0.2, 0.0]},
         "without a feasible point": {"infeasible_share": 0.2},
         "Feasible programs without an answer": {"solver_failed_share": 0.2},
