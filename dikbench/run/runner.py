@@ -309,7 +309,7 @@ def never_moved(out: Path) -> dict[str, str]:
     Oracles are among them only where nothing else moved.
 
     Returns:
-        The reason most of their trials have, by the name of the formulation.
+        How often each reason was met, failures first, by the name of the formulation.
 
     Raises:
         DikbenchError: if the folder holds no results.
@@ -317,8 +317,13 @@ def never_moved(out: Path) -> dict[str, str]:
     with ResultsFolder(out).open_store() as store:
         trials = store.planned()
     still = trials[~trials.groupby("formulation")["steps"].transform("max").gt(0)]
-    reasons = (still["status"] + ": " + still["message"]).groupby(still["formulation"], sort=False)
-    found = {str(name): f"{len(each)} ended as {each.mode().iloc[0]}" for name, each in reasons}
+    reasons = still["status"] + ": " + still["message"]
+    found: dict[str, str] = {}
+    for name, each in reasons.groupby(still["formulation"], sort=False):
+        counts = each.value_counts(sort=False).sort_index(
+            key=lambda texts: texts.str.startswith(Status.SKIPPED.value), kind="stable"
+        )
+        found[str(name)] = "; ".join(f"{number} {reason}" for reason, number in counts.items())
     of_formulations = {
         name: reason for name, reason in found.items() if parse_selector(name).name not in ORACLES
     }
