@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from math import ceil, nan
 from typing import Literal
 
@@ -17,6 +18,9 @@ from dikbench.statistics.failures import failures_at_worst, ran
 from dikbench.statistics.first_places import BROKEN
 from dikbench.statistics.stability import STABLE
 from dikbench.statistics.trial_matrix import CONTENDER
+
+SHOWN = 8
+"""Columns that are shown where the results have none of those that should be."""
 
 SETTING = ["plant", "reference"]
 
@@ -43,6 +47,8 @@ def make_table(kind: TableKind, trials: pd.DataFrame) -> Table:
         trials: the rows of trials.csv (of times, rows of timing.csv with a status will do).
     """
     chosen = [q for q in kind.quantities if q.of in {*trials.columns, *DERIVED}]
+    if not any(q.shown for q in chosen if q.of not in DERIVED):  # older results
+        chosen = [replace(q, shown=place < SHOWN) for place, q in enumerate(chosen)]
     needed = {*_READ, *(quantity.of for quantity in chosen)}
     rows = _derived(ran(trials[[name for name in trials if name in needed]]))
     if not kind.times:  # a failure is never folded into a time

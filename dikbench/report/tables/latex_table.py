@@ -27,10 +27,10 @@ WIDTH_PT = 240.0
 EM_PT = 8.0
 """Size of the type [pt]: at most that of scriptsize."""
 
-GAP_PT = 4.0
+GAP_PT = 3.0
 """Twice the space on each side of a column [pt]."""
 
-LARGEST_NAME_PT = 92.0
+LARGEST_NAME_PT = 70.0
 """Names of formulations that are wider are broken [pt]."""
 
 UNBROKEN = 8
@@ -82,7 +82,7 @@ def escape(text: str) -> str:
 def to_latex(table: Table) -> str:
     """The part over all families as one tabular, a section per plant and reference mode."""
     notes = [f"% {escape(note)}" for note in (table.title, *table.notes)]
-    return "\n".join([*notes, "", _tabular(table, table.overall), ""])
+    return "\n".join([*notes, _tabular(table, table.overall), ""])
 
 
 def to_latex_per_family(table: Table) -> str:
@@ -116,7 +116,7 @@ def _tabular(table: Table, blocks: Sequence[Block]) -> str:
     columns = [table.columns[place] for place in places]
     headings = ["formulation", *(_upright(column.heading) for column in columns)]
     lines = [
-        r"{\scriptsize\setlength{\tabcolsep}{2pt}%",
+        r"{\scriptsize\setlength{\tabcolsep}{1.5pt}%",
         f"\\begin{{tabular}}{{@{{}}p{{{first:.1f}pt}}{'r' * len(columns)}@{{}}}}",
         r"\toprule",
         _line(headings),

@@ -15,7 +15,9 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from makers.rows import Values, make_rows
 
+from dikbench.report.selection.judged import DEFINITIONS
 from dikbench.report.tables import latex_table, markdown
 from dikbench.report.tables.console import NAME, ROWS, WIDTH, to_text
 from dikbench.report.tables.csv_table import to_csv
@@ -23,6 +25,7 @@ from dikbench.report.tables.every import make_tables
 from dikbench.report.tables.files import write_table
 from dikbench.report.tables.latex_table import to_latex, to_latex_per_family
 from dikbench.report.tables.markdown import markdown_blocks, markdown_rows, to_markdown
+from dikbench.report.tables.success import success_table
 from dikbench.report.tables.table import (
     NOT_TOLD,
     Block,
@@ -256,7 +259,14 @@ LONG = _table(
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="there is no pdflatex")
 def test_latex_fits_a_column(tmp_path: Path, made_up_trials: pd.DataFrame) -> None:
     """Every table of a study, and names that mean harm: compiled, and no box is overfull."""
-    tables = [*make_tables(made_up_trials), HARMFUL, LONG]
+    names: dict[str | tuple[str, str], Values] = {"condition-governor": {}, "W" * 30: {}}
+    rows = [
+        make_rows(names, [f"f{k}"]).assign(situation=situation)
+        for k, situation in enumerate(DEFINITIONS)
+    ]
+    full = success_table(pd.concat(rows, ignore_index=True))
+    assert to_latex(full).count("rotatebox") == len(full.shown) == 10
+    tables = [*make_tables(made_up_trials), HARMFUL, LONG, full]
     inputs = []
     for number, table in enumerate(tables):
         write_table(replace(table, name=f"t{number}"), tmp_path / "tables")

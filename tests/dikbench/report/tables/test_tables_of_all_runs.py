@@ -263,6 +263,7 @@ def test_columns_that_older_results_lack_are_left_out() -> None:
     keys = [column.key for column in make_table(TRACKING_ERROR, trials).columns]
     start = "position_error_rms"
     assert keys == ["runs", *(f"{start}_{what}_mm" for what in ("median", "p95", "worst"))]
+    assert all(column.shown for column in make_table(TRACKING_ERROR, trials).columns)
 
 
 @pytest.mark.parametrize("status", [[], ["skipped", "skipped"]])
