@@ -75,7 +75,7 @@ STUDY_OPTIONS = (
     ),
     _axis(
         "plant",
-        "ideal or saturating, with noise and delay: 'ideal[noise=1e-4,delay=2]'; repeat.",
+        "ideal, protective or saturating, with noise and delay: 'ideal[noise=1e-4,delay=2]'.",
         metavar="SELECTOR",
     ),
     _axis(

@@ -105,9 +105,10 @@ def _idlers_do_nothing(rows: pd.DataFrame) -> Iterator[str]:
 
 
 def _shakers_and_the_reckless_fail(rows: pd.DataFrame) -> Iterator[str]:
-    jittery = straw_law(rows, "Jittery")
-    limited = jittery["velocity_peak_ratio"].gt(0)
-    yield from _named(jittery[limited & jittery["outcome"].isin(DONE)], "outcome")
+    for name in ("Jittery", "Shaker"):
+        law = straw_law(rows, name)
+        limited = law["velocity_peak_ratio"].gt(0)
+        yield from _named(law[limited & law["outcome"].isin(DONE)], "outcome")
     reckless = straw_law(rows, "Reckless")
     too_fast = reckless["velocity_peak_ratio"].gt(SPEED_TOLERANCE)
     yield from _named(reckless[too_fast & reckless["outcome"].isin(DONE)], "outcome")

@@ -14,24 +14,33 @@ from dikbench.robots.robot import Robot
 TIME_TO_FULL_SPEED_S: Final = 0.1
 """A joint without a known acceleration limit is taken to reach its speed limit in this time."""
 
+LONGEST_PERIOD_STEPS: Final = 5
+"""A joint chatters that jumps back within so many steps: a pattern of several steps is no better
+than one of two."""
+
 RELATIVE_ROUNDING: Final = 1e-9
 """A jump at the acceleration limit itself, to within this share of it, does not exceed it."""
 
 
 def chattering(motion: Motion) -> Mask:
-    """Find the steps in which a joint chatters, of those until the reference ends, (k,).
+    """Find the steps in which a joint chatters, of the whole run, (n,).
 
-    Its velocity changes one way and then, in the next step, the other way, dv_k dv_(k-1) < 0, both
-    times by more than a dt, with a its acceleration limit where one is known, otherwise its speed
-    limit over 0.1 s.
+    Its velocity jumps one way and, within `LONGEST_PERIOD_STEPS` steps, the other way, with nothing
+    but smaller changes between, both times by more than a dt, with a its acceleration limit where
+    one is known, otherwise its speed limit over 0.1 s.
     """
-    trace = motion.trace
     jumps = np.diff(motion.velocities, axis=0)
-    large = np.abs(jumps) > largest_acceleration(motion.scenario.robot) * trace.dt
-    mask = np.zeros(len(jumps), dtype=bool)
-    mask[1:] = (large[1:] & large[:-1] & (jumps[1:] * jumps[:-1] < 0)).any(axis=1)
-    before_end = trace.tau[:-1] < motion.scenario.reference.duration - 0.5 * trace.dt
-    return mask[before_end]
+    large = np.abs(jumps) > largest_acceleration(motion.scenario.robot) * motion.trace.dt
+    if not len(jumps):
+        return np.zeros(0, dtype=bool)
+    signs = np.where(large, np.sign(jumps), 0.0)
+    steps = np.arange(len(jumps))[:, None]
+    # The last jump before each step, by its number; -1 where there was none.
+    last = np.maximum.accumulate(np.where(large, steps, -1), axis=0)
+    before = np.vstack([np.full((1, jumps.shape[1]), -1), last[:-1]])
+    turned = np.take_along_axis(signs, np.maximum(before, 0), axis=0) * signs < 0
+    mask: Mask = (turned & (before >= 0) & (steps - before <= LONGEST_PERIOD_STEPS)).any(axis=1)
+    return mask
 
 
 def largest_acceleration(robot: Robot) -> Array:
@@ -50,6 +59,6 @@ def largest_acceleration(robot: Robot) -> Array:
 
 
 CHATTER = series_metrics(
-    "chatter", "", "until the reference ends in which a joint's velocity jumps back and forth",
+    "chatter", "", "in which a joint's velocity jumps back within 5 steps",
     chattering, "share", "steps",
 )  # fmt: skip

@@ -45,12 +45,23 @@ def judge(motion: Motion, status: Status) -> Judgement:
         off_path=_off_path(motion),
         end=Verdict(Outcome.UNFINISHED, last, away, "distance [m] from the target at the end"),
         chatter=_chatter(motion),
+        holds=_holds(motion),
     )
     if along is None:
         return decided
     done_99, done_90, in_time = along.tolerances
     extent = float(np.linalg.norm(along.path.points - along.path.points[0], axis=1).max())
     return replace(decided, done_99=done_99, done_90=done_90, in_time=in_time, extent=extent)
+
+
+def _holds(motion: Motion) -> bool:
+    """Say whether the robot is at the start where it is to stay, so that it must not leave."""
+    scenario, targets = motion.scenario, motion.target_points
+    moves = scenario.reference.moving or scenario.judged == "end"
+    away = max(
+        float(motion.tracking_error[0]), float(np.linalg.norm(targets - targets[0], axis=1).max())
+    )
+    return not moves and away <= scenario.tolerance_m
 
 
 def coped(motion: Motion, judgement: Judgement) -> float:

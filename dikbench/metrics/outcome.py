@@ -74,6 +74,7 @@ class Judgement:
             and at which the motion is in time [m] (see `AlongPath.tolerances`).
         extent: largest distance of the path from its start [m].
         chatter: what comes after any tolerance; None where nothing does.
+        holds: whether the robot is where it is to stay from the start on.
     """
 
     before: Verdict | None
@@ -87,6 +88,7 @@ class Judgement:
     in_time: float = NAN
     extent: float = 0.0
     chatter: Verdict | None = None
+    holds: bool = False
 
     def at(self, tolerance: float) -> Verdict:
         """Decide the outcome at a tolerance [m]."""
@@ -98,6 +100,8 @@ class Judgement:
     def _not_done(self, tolerance: float) -> Iterator[Verdict]:
         """What keeps the task from being done."""
         if not self.has_path:
+            if self.holds and not self.off_path.figure <= tolerance:
+                yield self.off_path
             if not self.end.figure <= tolerance:  # NaN is no success
                 yield Verdict(Outcome.UNFINISHED, self.end.step, self.end.figure, self.end.reason)
             return
@@ -136,6 +140,7 @@ class Judgement:
             "decided_before": "" if self.before is None else self.before.outcome.value,
             "chatters": float(self.chatter is not None),
             "judged_by_path": float(self.has_path),
+            "holds": float(self.holds),
             "off_path_by": self.off_path.reason,
             "path_extent_m": self.extent,
             "tolerance_m": tolerance,
@@ -158,6 +163,7 @@ class Judgement:
             in_time=row["lag_tolerance_m"],
             extent=row["path_extent_m"],
             chatter=Verdict(Outcome.CHATTERING) if chatters else None,
+            holds=row["holds"] == 1,
         )
 
 
@@ -180,6 +186,7 @@ OUTCOME_NUMBERS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
         "outcome_figure": ("", "value that decided it, in what `outcome_reason` says"),
         "chatters": ("", "whether it chatters, which decides after any tolerance (1, 0)"),
         "judged_by_path": ("", "whether the whole path is judged, or the end alone (1, 0)"),
+        "holds": ("", "whether the robot is at the start where it is to stay (1, 0)"),
         "path_extent_m": ("m", "largest distance of the path from its start (L = 0.2 m)"),
         "tolerance_m": ("m", "tolerance of the scenario, at which `outcome` is decided"),
         "coped": ("", "where nothing can follow: whether limits were kept, the path done as far as "

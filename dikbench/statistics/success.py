@@ -159,7 +159,8 @@ def paired_means(differences: Array, found: Rates) -> tuple[Array, Array, Array]
     tails = ((1 - INTERVAL_COVERAGE) / 2, (1 + INTERVAL_COVERAGE) / 2)
     lower, upper = np.full((2, len(means)), np.nan)
     defined = ~np.isnan(means)
-    lower[defined], upper[defined] = np.nanquantile(resampled[:, defined], tails, axis=0)
+    if defined.any():
+        lower[defined], upper[defined] = np.nanquantile(resampled[:, defined], tails, axis=0)
     return means, lower, upper
 
 

@@ -18,7 +18,7 @@ from dikbench.plugins.building import (
 from dikbench.problem.problem import program_of
 from dikbench.scenario.oracle import ORACLE, ORACLES
 from dikbench.selector import Selector, parse_selector
-from dikbench.solvers.catalogue.back_ends import parse_solver, why_not
+from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, parse_solver, why_not
 from dikbench.study.identity import trial_id
 from dikbench.study.split import check_split
 from dikbench.study.study import Study, load_study, naming
@@ -125,8 +125,6 @@ def _solvers_for(
     if program is None:
         return [(NO_SOLVER, "")]
     if not parsed:
-        raise DikbenchError(
-            f"study {study.name}: formulation {str(formulation)!r} needs a solver, its cells name "
-            "none"
-        )
+        default = DEFAULT_SOLVER[program]
+        parsed = [(parse_selector(default), parse_solver(default))]
     return [(selector, why_not(solver, program)) for selector, solver in parsed]

@@ -79,7 +79,27 @@ class Jittery(Parameters):
         return _scaled(problem) + next(self.signs) * self.share * fastest
 
 
-STRAW_LAWS: Final = (Idle, Creeper, Reckless, Jittery)
+@dataclass(frozen=True)
+class Shaker(Parameters):
+    """Shakes with a period of four steps: v = s J^+ V +- share v_max, two steps up and two down.
+
+    Attributes:
+        share: amplitude over the velocity limits.
+    """
+
+    share: Annotated[float, Range(0.0, 1.0)] = 0.1
+    signs: cycle[float] = field(
+        default_factory=lambda: cycle((1.0, 1.0, -1.0, -1.0)), init=False, compare=False, repr=False
+    )
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """See `Formulation`."""
+        limit = problem.limits.joint.velocity
+        fastest = np.ones(problem.robot.nv) if limit is None else _finite(limit)
+        return _scaled(problem) + next(self.signs) * self.share * fastest
+
+
+STRAW_LAWS: Final = (Idle, Creeper, Reckless, Jittery, Shaker)
 """All straw laws."""
 
 

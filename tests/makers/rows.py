@@ -27,6 +27,7 @@ DONE: Final[Values] = {
     "outcome_step": -1.0,
     "chatters": 0.0,
     "judged_by_path": 1.0,
+    "holds": 0.0,
     "path_extent_m": 0.5,
     "tolerance_m": 0.005,
     "speed_need": 0.5,

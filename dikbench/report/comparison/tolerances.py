@@ -63,6 +63,11 @@ def parse_tolerance(text: str) -> Tolerance:
             "position_error_rms_m=1e-6, position_error_rms_m=5%, success=2% or "
             f"{COMPARED[0]}=20%"
         )
+    if name == SUCCESS and bound > 1:
+        raise DikbenchError(
+            f"tolerance {text!r}: a rate of success cannot fall by more than 100 %; valid: points, "
+            f"such as {SUCCESS}=2%"
+        )
     if name in COMPARED and not percent:
         raise DikbenchError(
             f"tolerance {text!r}: times are compared as ratios, on whatever machine; give a share "

@@ -26,9 +26,10 @@ DEFINITIONS: Final[Mapping[Situation, str]] = MappingProxyType(
         "near singularities": "the exact motion passes a smallest singular value below 0.05 "
         "(m, rad) and needs more than 1.2 of a joint's speed limit",
         "at joint limits": "the exact motion comes within 50 mrad of a position limit, or beyond",
-        "beyond joint speed": "the exact motion needs more than a joint's speed limit, away from "
-        "limits and singularities",
-        "free space": "the exact motion keeps every limit, away from limits and singularities",
+        "beyond joint speed": "the exact motion needs more than a joint's speed limit, and is in "
+        "none of the situations above",
+        "free space": "the exact motion keeps every limit, and is in none of the situations above "
+        "(it may pass a singularity at a speed that asks for little)",
         "steps": "the target jumps, so that no motion can stay at it",
         "start outside": "the start is outside a position limit",
         CONSTRAINED: "distances from obstacles, between links, or torques are limited",

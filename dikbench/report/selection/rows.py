@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from dikbench.report.drawing.style import contender_name
+from dikbench.report.selection.categories import categories
 from dikbench.scenario.oracle import ORACLES
 
 LEAST_ERROR = 1e-5
@@ -77,15 +78,19 @@ def failures_at_infinity(rows: pd.DataFrame, column: str) -> pd.Series:
 
 
 def ranked(rows: pd.DataFrame, column: str) -> list[str]:
-    """The formulations, the oracle first, then by their median in a column; failures count worst.
+    """Order formulations: oracles, then by mean outcome, then by their median in a column.
+
+    What stands still on its path is no better than what follows it.
 
     Args:
         rows: of trials.
         column: of which less is better.
     """
     worth = rows.assign(worth=failures_at_infinity(rows, column))
-    medians = worth.groupby("formulation", sort=False)["worth"].median()
-    order = medians.sort_values(kind="stable", na_position="last").index
+    worth = worth.assign(category=categories(rows))
+    by_formulation = worth.groupby("formulation", sort=False)
+    table = by_formulation.agg({"category": "mean", "worth": "median"})
+    order = table.sort_values(["category", "worth"], kind="stable", na_position="last").index
     return sorted(order, key=lambda name: name not in ORACLES)
 
 

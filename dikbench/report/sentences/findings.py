@@ -215,8 +215,8 @@ def unanswered(rows: pd.DataFrame, names: Names) -> Finding | None:
     most = list(worst[worst >= (1 - SAME_SHARE) * worst.max()].index)
     return Finding(
         "No answer",
-        f"{names.of(most)} had no answer in up to {number(100 * worst.max())} % of a run's steps, "
-        "and braked instead.",
+        f"{names.of(most)} posed programs without a feasible point, or got no answer, in up to "
+        f"{number(100 * worst.max())} % of a run's steps, and braked instead.",
     )
 
 

@@ -46,7 +46,12 @@ COLUMNS = (
         "share of all steps whose answer failed the recheck by our own residuals",
         "low",
     ),
-    Column("residual_worst", "residual worst", "largest primal residual of all steps", "low"),
+    Column(
+        "residual_worst",
+        "residual worst",
+        "largest primal residual of all steps, answered or not",
+        "low",
+    ),
     Column(
         "optimum_worst", "from optimum worst [rad/s]", "largest distance from the optimum", "low"
     ),

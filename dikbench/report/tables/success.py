@@ -200,8 +200,8 @@ def _notes(trials: pd.DataFrame) -> list[str]:
         "starred, in points, from a bootstrap of paired trials; none where it has no width.",
     ]
     if len(left_out):
-        said = {"no": "that nothing can do, by proof", "unknown": "of which no motion is known"}
+        said = {"no": "cases that nothing can do", "unknown": "of which no motion is known"}
         parts = [f"{count} {said[str(kind)]}" for kind, count in left_out.items() if kind in said]
         if parts:
-            notes.append(f"Left out of the rates are cases {' and '.join(parts)}.")
+            notes.append(f"Left out of the rates are {' and '.join(parts)}.")
     return notes

@@ -56,7 +56,7 @@ def test_the_study_has_what_the_invariants_are_about(rows: pd.DataFrame) -> None
     ran = rows[rows["status"] != "skipped"]
     found = set(ran["outcome"])
     assert {"success", "recovered", "not-recovered", "limit-broken", "unfinished"} <= found
-    assert ran[is_straw(ran)]["formulation"].nunique() == 4
+    assert ran[is_straw(ran)]["formulation"].nunique() == 5
     assert ran["formulation"].eq("slowed-oracle").sum() > 6
     assert ran["situation"].nunique() >= 4
 

@@ -122,6 +122,10 @@ def expected(trace: Trace, scenario: Scenario, status: Status, tolerance: float)
     there = min(float(trace.tau[-1]), reference.duration)
     away = float(np.linalg.norm(x[-1] - x_of(reference.placement(there))))
     if not reference.moving:
+        target = x_of(reference.placement(0.0))
+        distances = [float(np.linalg.norm(p - target)) for p in x]
+        if distances[0] <= scenario.tolerance_m and max(distances) > tolerance:
+            return Outcome.LEFT_PATH
         if away > tolerance:
             return Outcome.UNFINISHED
     else:
@@ -153,6 +157,8 @@ def expected(trace: Trace, scenario: Scenario, status: Status, tolerance: float)
         else:
             if contour > tolerance:
                 return Outcome.LEFT_PATH
+            if trace.mode == "path" and trace.tau[-1] < reference.duration * (1 - 1e-9):
+                return Outcome.UNFINISHED
             places = covered(tolerance)
             least = 0.90 if trace.mode == "time" else 0.99
             if arcs[places[-1]] < least * arcs[-1] - 1e-9:
@@ -164,12 +170,16 @@ def expected(trace: Trace, scenario: Scenario, status: Status, tolerance: float)
     dv = np.diff(np.vstack([scenario.v0, trace.applied]), axis=0)
     known = robot.available_acceleration
     jump = dt * (robot.limits.velocity.upper / 0.1 if known is None else known)
-    steps = [k for k in range(trace.steps) if trace.tau[k] < reference.duration - dt / 2]
-    count = sum(
-        bool(k and ((dv[k] * dv[k - 1] < 0) & (abs(dv[k]) > jump) & (abs(dv[k - 1]) > jump)).any())
-        for k in steps
-    )
-    if count >= 10 and count > 0.05 * len(steps):
+    count = 0
+    for k in range(trace.steps):
+        found = False
+        for joint, most in enumerate(np.broadcast_to(jump, dv.shape[1])):
+            if abs(dv[k, joint]) > most:
+                before = [i for i in range(k) if abs(dv[i, joint]) > most]
+                back = bool(before) and dv[before[-1], joint] * dv[k, joint] < 0
+                found |= back and k - before[-1] <= 5
+        count += found
+    if count >= 10 and count > 0.05 * trace.steps:
         return Outcome.CHATTERING
     by_way = reference.moving and trace.mode == "time" and scenario.feasible == "path"
     return Outcome.RECOVERED if by_way else Outcome.SUCCESS

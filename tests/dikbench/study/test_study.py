@@ -145,7 +145,6 @@ def test_selectors_stand_in_the_trial_as_they_were_given() -> None:
         (("formulations", "formulation"), ("formulation", "valid keys", "solvers")),
         (('"dls"', '"dlss"'), ("dlss", "did you mean 'dls'")),
         (('"dls"', '"dls[damp=1]"'), ("damp", "valid: damping")),
-        (('"dls"', '"qp"'), ("qp", "needs a solver")),
         (('"reach"', '"reech"'), ("reech", "did you mean 'reach'")),
         (('"reach"', '"reach[distance=7]"'), ("distance=7", "must be 0.01 to 0.3")),
         (('"reach"', '"reach[robot=ur55]"'), ("ur55", "did you mean 'ur5'")),
