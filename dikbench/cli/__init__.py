@@ -18,7 +18,9 @@ from dikbench.cli.reading_commands import compare, replay, table
 EXIT_CODE_OF_STANDSTILL = 3
 """Exit code of a run in which no trial of a formulation took a step."""
 
-SUBJECTS = ("formulations", "scenarios", "solvers", "plants", "robots", "metrics", "studies")
+SUBJECTS = (
+    "formulations", "scenarios", "solvers", "plants", "robots", "metrics", "outcomes", "studies",
+)  # fmt: skip
 
 
 def main() -> None:

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from dikbench.errors import DikbenchError, unknown
-from dikbench.metrics import METRICS, Metric
+from dikbench.metrics import METRICS, OUTCOME_SENTENCES, Metric, Outcome
 from dikbench.plugins.building import make_formulation, make_plant, make_scenario
 from dikbench.plugins.finding import (
     Plugin,
@@ -103,6 +103,7 @@ _SUBJECTS: Mapping[str, Callable[[], list[tuple[str, str, str]]]] = {
     "plants": lambda: [(name, _plant(name).summary.rstrip("."), "") for name in PLANTS],
     "robots": lambda: [(name, entry.summary, "") for name, entry in ROBOTS.items()],
     "metrics": _metrics,
+    "outcomes": lambda: [(each.value, text, "") for each, text in OUTCOME_SENTENCES.items()],
     "studies": lambda: [(n, load_study(n).description, "") for n in shipped_studies()],
 }
 
@@ -143,6 +144,8 @@ def _without_parameters(name: str) -> str:
         return _robot(name)
     if name in METRICS:
         return _metric(name)
+    if name in {outcome.value for outcome in Outcome}:
+        return f"{name}: {OUTCOME_SENTENCES[Outcome(name)]}"
     if name in shipped_studies() or name.endswith(".toml"):
         study = load_study(name)
         path = shipped_studies().get(name, name)

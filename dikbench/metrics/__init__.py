@@ -13,6 +13,7 @@ from dikbench.metrics.motion import Motion
 from dikbench.metrics.motion_of_trace import motion_of
 from dikbench.metrics.outcome import (
     OUTCOME_NUMBERS,
+    OUTCOME_SENTENCES,
     OUTCOME_TEXTS,
     Judgement,
     Outcome,
@@ -24,6 +25,7 @@ from dikbench.metrics.violation import VIOLATION_TOLERANCE
 __all__ = [
     "METRICS",
     "OUTCOME_NUMBERS",
+    "OUTCOME_SENTENCES",
     "OUTCOME_TEXTS",
     "REDUCTIONS",
     "VIOLATION_TOLERANCE",

@@ -14,9 +14,9 @@ from dikbench.robots.robot import Robot
 TIME_TO_FULL_SPEED_S: Final = 0.1
 """A joint without a known acceleration limit is taken to reach its speed limit in this time."""
 
-LONGEST_PERIOD_STEPS: Final = 5
-"""A joint chatters that jumps back within so many steps: a pattern of several steps is no better
-than one of two."""
+LONGEST_PERIOD_STEPS: Final = 2
+"""A joint chatters that jumps back within so many steps: two steps up and two down are no better
+than one. With 5 the exact motion of a fast pick and place does."""
 
 RELATIVE_ROUNDING: Final = 1e-9
 """A jump at the acceleration limit itself, to within this share of it, does not exceed it."""
@@ -59,6 +59,6 @@ def largest_acceleration(robot: Robot) -> Array:
 
 
 CHATTER = series_metrics(
-    "chatter", "", "in which a joint's velocity jumps back within 5 steps",
+    "chatter", "", "in which a joint's velocity jumps back within 2 steps",
     chattering, "share", "steps",
 )  # fmt: skip

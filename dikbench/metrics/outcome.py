@@ -41,6 +41,28 @@ class Outcome(StrEnum):
     RECOVERED = "recovered"
 
 
+OUTCOME_SENTENCES: Final[Mapping[Outcome, str]] = MappingProxyType(
+    {
+        Outcome.DID_NOT_RUN: "the run broke off: an error, a crash, no time or memory left",
+        Outcome.DIVERGED: "the motion left all bounds",
+        Outcome.COLLIDED: "a distance fell more than 1 mm below its margin",
+        Outcome.LIMIT_BROKEN: "a joint passed a limit: 1.001 of its speed or torque, 1.01 of its "
+        "acceleration, 1e-3 rad or m of its range",
+        Outcome.LEFT_PATH: "farther from the path, or from where it is to stay, than the tolerance",
+        Outcome.UNFINISHED: "less than 99 % of the path done where it waits, less than 90 % by the "
+        "clock, or not at the target in the end",
+        Outcome.LATE: "behind the clock by more than 0.1 s and 5 % of the nominal duration",
+        Outcome.NOT_RECOVERED: "where nothing can follow the clock: not back at the end, or away "
+        "by more than 10 tolerances or a quarter of the path's extent",
+        Outcome.CHATTERING: "a joint's velocity jumps back within 2 steps in more than 5 % of the "
+        "steps",
+        Outcome.SUCCESS: "the robot did its job",
+        Outcome.RECOVERED: "nothing can follow the clock here; the robot gave way and came back",
+    }
+)
+"""What the outcomes say, each but the last two being what came first in the way."""
+
+
 @dataclass(frozen=True)
 class Verdict:
     """An outcome and what decided it.

@@ -46,7 +46,8 @@ def test_a_study_runs_from_a_script_as_from_the_command_line(tmp_path: Path) -> 
     script = tmp_path / "script.py"
     script.write_text(
         "import dikbench\n"
-        "chosen = {'formulations': 'dls', 'scenarios': 'reach[duration=0.2]', 'plants': 'ideal'}\n"
+        "chosen = {'formulations': 'dls', 'scenarios': 'reach[duration=0.2]'}\n"
+        "chosen['references'] = 'time'\n"
         "results = dikbench.run_study(**chosen, out='out', jobs=1)\n"
         "print(list(results.trials['status']), len(results.steps()))\n"
     )
@@ -98,7 +99,7 @@ def test_a_trial_in_other_words_is_the_same_trial(tmp_path: Path) -> None:
         "formulations": "dls[damping=0.05]",
         "scenarios": "reach[robot=panda,duration=2e-1]",
     }
-    how: dict[str, Any] = {"plants": "ideal", "jobs": 1, "report": False}
+    how: dict[str, Any] = {"references": "time", "jobs": 1, "report": False}
     one = dikbench.run_study(**plain, **how, out=tmp_path / "one")
     again = dikbench.run_study(**spelt, **how, out=tmp_path / "one")
     assert list(again.trials["id"]) == list(one.trials["id"])

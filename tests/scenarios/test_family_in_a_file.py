@@ -70,7 +70,10 @@ def test_its_ranges_and_its_certificate_are_asserted(line: str) -> None:
 def test_a_study_takes_it_and_a_report_does_not_execute_it(line: str) -> None:
     """Selected on the command line it is a scenario like any; in results it is data."""
     selection = Selection(
-        formulations=("dls",), scenarios=(f"{line}[speed=0.1|0.2]",), plants=("ideal",)
+        formulations=("dls",),
+        scenarios=(f"{line}[speed=0.1|0.2]",),
+        plants=("ideal",),
+        references=("time",),
     )
     planned = expand(select(load_study("quick"), selection, named=False))
     assert len({trial.id for trial in planned}) == len(planned) == 2

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from dikbench.arrays import Mask
-from dikbench.metrics import Judgement, Outcome
+from dikbench.metrics import OUTCOME_SENTENCES, Judgement, Outcome
 from dikbench.report.selection.judged import SETTINGS, judged_plant, judged_rows
 from dikbench.report.tables.success import NO_OUTCOMES
 from dikbench.report.tables.table import ALL, Block, Column, Table, TableCell, TableRow
@@ -89,7 +89,7 @@ def outcome_table(trials: pd.DataFrame) -> Table:
         Column(
             outcome.value.replace("-", "_"),
             outcome.value,
-            f"number of trials of which the outcome is {outcome.value}",
+            f"number of trials: {OUTCOME_SENTENCES[outcome]}",
             count=True,
             shown=outcome.value in seen,
         )

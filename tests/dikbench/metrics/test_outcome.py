@@ -177,7 +177,7 @@ def expected(trace: Trace, scenario: Scenario, status: Status, tolerance: float)
             if abs(dv[k, joint]) > most:
                 before = [i for i in range(k) if abs(dv[i, joint]) > most]
                 back = bool(before) and dv[before[-1], joint] * dv[k, joint] < 0
-                found |= back and k - before[-1] <= 5
+                found |= back and k - before[-1] <= 2
         count += found
     if count >= 10 and count > 0.05 * trace.steps:
         return Outcome.CHATTERING

@@ -150,7 +150,7 @@ def test_notes_say_what_is_left_out_and_definitions_what_is_in(
     """The far scenario and the odd one, with two seeds each; cases, scenarios, families, robots."""
     table = success_table(made_up_trials)
     said = " ".join(table.notes)
-    assert "2 that nothing can do, by proof and 2 of which no motion is known" in said
+    assert "2 cases that nothing can do and 2 of which no motion is known" in said
     assert "at most 5 % of all trials" in said
     assert "50 % of what the best" in said
     [free] = [column for column in table.columns if column.heading == "free space"]
