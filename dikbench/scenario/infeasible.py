@@ -113,6 +113,8 @@ def _rigid_clearance(scenario: Scenario, last: float) -> str:
             if tau <= last and distance - constraint.margin < deepest[0] - deepest[1]:
                 deepest = (distance, constraint.margin, float(tau))
     distance, margin, tau = deepest
+    if distance >= margin - ALLOWED_INSIDE_M:
+        return ""
     lever = _size_of_what_is_carried(scenario) / CHARACTERISTIC_LENGTH_M
     mended = scenario.tolerance_m * float(np.hypot(1.0, lever))
     if distance + mended < margin - ALLOWED_INSIDE_M:
