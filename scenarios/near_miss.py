@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.errors import DikbenchError
-from dikbench.problem import Array, Drawn, Range, Robot
+from dikbench.problem import Array, Drawn, Kinematics, PoseTask, Range, Robot
 from dikbench.scenario import (
     SINGULAR_NEED,
     Case,
@@ -30,7 +30,6 @@ from dikbench.scenario import (
     joint_oracle,
     make_singular,
     oracle_motion,
-    placement_of,
     screw_path,
     singular_postures,
     solve_placement,
@@ -286,5 +285,7 @@ def _claims(
 
 
 def _distance_from(where: Singularity, q: Array, arm: Robot) -> float:
-    """Compute the twist's length (m, rad) from the singular placement to that of q."""
-    return float(np.linalg.norm(pin.log6(where.placement.actInv(placement_of(arm, q))).np))
+    """Compute the length (m, rad) of what is asked for, from q to the singular placement."""
+    kinematics = Kinematics(arm)
+    kinematics.update(q)
+    return float(np.linalg.norm(PoseTask().linearize(kinematics, where.placement).error))

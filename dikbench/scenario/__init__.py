@@ -58,6 +58,7 @@ from dikbench.scenario.oracle import (
     joint_oracle,
     measure_motion,
     oracle_motion,
+    position_margin,
     solve_placement,
 )
 from dikbench.scenario.reference.curves import circle, lemniscate, plane_of
@@ -141,6 +142,7 @@ __all__ = [
     "oracle_motion",
     "placement_of",
     "plane_of",
+    "position_margin",
     "read_poses",
     "samples",
     "screw_path",

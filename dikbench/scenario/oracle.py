@@ -69,7 +69,8 @@ def solve_placement(
     """Find a configuration that does a tracking task, by damped Gauss-Newton from `seed`.
 
     Steps are Levenberg-Marquardt with damping by the squared error (Sugihara 2011) of at most
-    0.3 rad; position limits are ignored.
+    0.3 rad; position limits are ignored. Joints that slide count by their range
+    (`Robot.joint_scale`), so that a short one is not taken far outside where others can move.
 
     Args:
         robot: the robot.
@@ -87,13 +88,13 @@ def solve_placement(
     for _ in range(iterations):
         kinematics.update(q)
         task = tracking.linearize(kinematics, target)
-        e, J = task.error, task.J
+        e, J = task.error, task.J * robot.joint_scale
         before, error = error, float(np.linalg.norm(e))
         if error < 1e-12 or (error < 1e-9 and error >= before):
             return q  # there, up to rounding
         H = J.T @ J
         H.flat[:: len(H) + 1] += 0.1 * error**2 + 1e-12
-        step = np.linalg.solve(H, J.T @ e)
+        step = robot.joint_scale * np.linalg.solve(H, J.T @ e)
         largest = float(np.abs(step).max())
         q = pin.integrate(robot.model, q, step * min(1.0, 0.3 / max(largest, 1e-300)))
     raise DikbenchError(
