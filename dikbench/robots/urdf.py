@@ -40,30 +40,40 @@ def urdf_model(path: str, root: Root = "fixed") -> tuple[Any, list[UrdfJoint]]:
         raise DikbenchError(f"robot file not found: {path}")
     if root not in get_args(Root):
         raise unknown("root", root, get_args(Root))
+    document = _document(path)
+    elements = {element.get("name", ""): element for element in document.findall("joint")}
     try:
-        model = _built(pin.buildModelFromUrdf, path, root)
-        document = ElementTree.parse(path).getroot()
-        elements = {element.get("name", ""): element for element in document.findall("joint")}
         joints = [_joint(e) for e in elements.values() if e.get("type") in MOVING]
         for link in document.findall("link"):
             mass = link.find("inertial/mass")
             if mass is not None and _number(mass, "value", "mass") < 0:
                 raise DikbenchError(f"link {link.get('name')!r} has a negative mass")
-        following = followers(joints, list(model.names))
-        if following:
-            write_followers(elements, following)
-            text = ElementTree.tostring(document, encoding="unicode")
-            model = _built(pin.buildModelFromXML, text, root, mimic=True)
-    except ElementTree.ParseError as error:
-        raise DikbenchError(f"robot file {path} is not XML: {error}") from None
     except DikbenchError as error:
         raise DikbenchError(f"robot file {path}: {error}") from None
+    model = _built(path, pin.buildModelFromUrdf, path, root)
+    try:
+        following = followers(joints, list(model.names))
+    except DikbenchError as error:
+        raise DikbenchError(f"robot file {path}: {error}") from None
+    if following:
+        write_followers(elements, following)
+        text = ElementTree.tostring(document, encoding="unicode")
+        model = _built(path, pin.buildModelFromXML, text, root, mimic=True)
     if model.nv == 0:
         raise DikbenchError(f"robot file {path}: the model has no moving joint")
     return model, following
 
 
-def _built(build: Callable[..., Any], source: str, root: Root, **options: bool) -> Any:
+def _document(path: str) -> ElementTree.Element:
+    try:
+        return ElementTree.parse(path).getroot()
+    except (ElementTree.ParseError, LookupError, ValueError) as error:
+        raise DikbenchError(f"robot file {path} is not a URDF, which is XML: {error}") from None
+    except OSError as error:
+        raise DikbenchError(f"robot file {path}: {error.strerror or error}") from None
+
+
+def _built(path: str, build: Callable[..., Any], source: str, root: Root, **options: bool) -> Any:
     """Build a model with Pinocchio; its complaints become the message."""
     joint = () if root == "fixed" else (ROOT_JOINTS[root](),)
     with captured_stderr() as complaints:
@@ -71,7 +81,9 @@ def _built(build: Callable[..., Any], source: str, root: Root, **options: bool) 
             return build(source, *joint, **options)
         except (ValueError, RuntimeError) as error:
             reason = " ".join(f"{error} {complaints()}".split())
-            raise DikbenchError(f"not a URDF that Pinocchio reads: {reason}") from None
+            raise DikbenchError(
+                f"robot file {path} is not a URDF that Pinocchio reads: {reason}"
+            ) from None
 
 
 def _joint(element: ElementTree.Element) -> UrdfJoint:
