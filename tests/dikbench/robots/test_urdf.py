@@ -301,14 +301,12 @@ def test_locked_joints_do_not_move(tmp_path: Path) -> None:
     at = {"j2": 0.4, "j1": 0.1}
     placed = load_robot(path, "tool", lock=at, start=[0.1, 0.2, 0.3])
     free = load_robot(path, "tool", start=[0.1, 0.4, 0.1, 0.2, 0.3])
-    kinematics = [Kinematics(each) for each in (placed, free)]
-    for each, robot_ in zip(kinematics, (placed, free), strict=True):
-        each.update(robot_.q0)
-    np.testing.assert_allclose(
-        kinematics[0].placement(placed.frame_id).homogeneous,
-        kinematics[1].placement(free.frame_id).homogeneous,
-        atol=1e-12,
-    )
+    poses = []
+    for each in (placed, free):
+        kinematics = Kinematics(each)
+        kinematics.update(each.q0)
+        poses.append(kinematics.placement(each.frame_id).homogeneous)
+    np.testing.assert_allclose(poses[0], poses[1], atol=1e-12)
 
 
 @pytest.mark.parametrize(
