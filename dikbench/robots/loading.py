@@ -271,6 +271,6 @@ def _check_ranges(robot: Robot) -> None:
         )
         raise DikbenchError(
             f"robot {robot.name}: joint {model.names[joint]!r} cannot move: its position limits "
-            f"are {position.lower[stuck[0]]:g} and {position.upper[stuck[0]]:g} (0 where a URDF "
+            f"are both {position.lower[stuck[0]] + 0.0:g} (0 where a URDF "
             f"has none); give it limits, or lock it: lock={model.names[joint]}"
         )

@@ -82,19 +82,22 @@ def solve_placement(
     Raises:
         DikbenchError: if the residual (m, rad) does not fall below 1e-9.
     """
-    kinematics = Kinematics(robot)
+    kinematics, step = Kinematics(robot), np.zeros(robot.nv)
     q = seed
     error = np.inf
     for _ in range(iterations):
         kinematics.update(q)
         task = tracking.linearize(kinematics, target)
-        e, J = task.error, task.J * robot.joint_scale
+        e, J = task.error, task.J
+        moving = J.any(axis=0)  # a few joints of a humanoid's hundred
+        scale = robot.joint_scale[moving]
+        J = (J if moving.all() else J[:, moving]) * scale
         before, error = error, float(np.linalg.norm(e))
         if error < 1e-12 or (error < 1e-9 and error >= before):
             return q  # there, up to rounding
         H = J.T @ J
         H.flat[:: len(H) + 1] += 0.1 * error**2 + 1e-12
-        step = robot.joint_scale * np.linalg.solve(H, J.T @ e)
+        step[moving] = scale * np.linalg.solve(H, J.T @ e)
         largest = float(np.abs(step).max())
         q = pin.integrate(robot.model, q, step * min(1.0, 0.3 / max(largest, 1e-300)))
     raise DikbenchError(
