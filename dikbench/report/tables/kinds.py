@@ -71,12 +71,14 @@ class TableKind:
         quantities: its columns, those that are shown first.
         times: whether its numbers are times, which belong to a formulation, a solver and a
             scenario, whatever the plant, reference mode and seed.
+        empty: what is said where it has no rows.
     """
 
     name: str
     title: str
     quantities: Sequence[Quantity]
     times: bool = False
+    empty: str = "Nothing was measured."
 
 
 DERIVED: Final[Mapping[str, str]] = MappingProxyType(
@@ -88,6 +90,11 @@ DERIVED: Final[Mapping[str, str]] = MappingProxyType(
     }
 )
 """Columns that are derived from the rows of trials, to be counted."""
+
+NOT_TIMED: Final = (
+    "No timing pass was made: `dikbench time`, with the study and the options of the run, makes it."
+)
+"""Stands in place of times that nobody took."""
 
 RUNS: Final = Quantity("trial", Statistic.NUMBER, "runs", "runs")
 
@@ -193,6 +200,7 @@ TIMING: Final = TableKind(
         *_more("missed_500_hz_share", "missed at 500 Hz", "%", PERCENT),
     ),
     times=True,
+    empty=NOT_TIMED,
 )  # fmt: skip
 
 KINDS: Final = (TRACKING_ERROR, LIMIT_VIOLATION, TIMING)
