@@ -89,8 +89,8 @@ def leaders(
     rivals = np.array([name in may_be for name in every]) & found.whole
     if too_few(part) and found.rate[rivals].max(initial=0.0) > 0:
         text = (
-            f"success of {_sample(part)}: of at least {FEWEST_SCENARIOS} scenarios it would be "
-            f"said who is first; those that may be have {_range(found.rate[rivals])}."
+            f"success of {_sample(part)}: too few to say who is first ({FEWEST_SCENARIOS} "
+            f"scenarios are asked for); the candidates have {_range(found.rate[rivals])}."
         )
         return Leaders((), False, found, Finding(f"Too few cases where {IN_WORDS[setting]}", text))
     first = first_places(part, found)

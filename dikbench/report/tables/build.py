@@ -62,7 +62,14 @@ def make_table(kind: TableKind, trials: pd.DataFrame) -> Table:
         for name, of_family in _families(rows)
         for setting, part in _settings(kind, of_family)
     ]
-    return Table(kind.name, kind.title, columns, tuple(blocks), tuple(_notes(kind)), kind.empty)
+    return Table(
+        kind.name,
+        kind.title,
+        columns,
+        tuple(blocks),
+        tuple(_notes(kind) if blocks else ()),
+        kind.empty,
+    )
 
 
 def _column(quantity: Quantity) -> Column:
