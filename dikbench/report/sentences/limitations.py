@@ -9,8 +9,7 @@ from typing import Any, Final
 import pandas as pd
 
 from dikbench.plugins.finding import plugins
-from dikbench.report.sentences.words import listed, number, quoted, several
-from dikbench.report.tables.kinds import NOT_TIMED
+from dikbench.report.sentences.words import NOT_TIMED, listed, number, quoted, several
 from dikbench.scenario.oracle import ORACLE
 from dikbench.scenario.plant import PLANTS, REFERENCE_MODES
 from dikbench.selector import parse_selector

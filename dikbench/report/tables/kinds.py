@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import Final
 
 from dikbench.metrics import METRICS
+from dikbench.report.sentences.words import NOT_TIMED
 from dikbench.results.columns import TIMES
 
 MM: Final = 1e3
@@ -90,11 +91,6 @@ DERIVED: Final[Mapping[str, str]] = MappingProxyType(
     }
 )
 """Columns that are derived from the rows of trials, to be counted."""
-
-NOT_TIMED: Final = (
-    "No timing pass was made: `dikbench time`, with the study and the options of the run, makes it."
-)
-"""Stands in place of times that nobody took."""
 
 RUNS: Final = Quantity("trial", Statistic.NUMBER, "runs", "runs")
 

@@ -10,7 +10,8 @@ from typing import Final
 import pandas as pd
 
 from dikbench.report.selection.judged import judged_rows
-from dikbench.report.tables.kinds import MS, NOT_TIMED, PERCENT
+from dikbench.report.sentences.words import NOT_TIMED
+from dikbench.report.tables.kinds import MS, PERCENT
 from dikbench.report.tables.table import ALL, Block, Column, Table, TableCell, TableRow
 from dikbench.statistics.failures import ran
 from dikbench.statistics.success import rates, succeeded
