@@ -54,8 +54,8 @@ OUTCOME_SENTENCES: Final[Mapping[Outcome, str]] = MappingProxyType(
         Outcome.LATE: "behind the clock by more than 0.1 s and 5 % of the nominal duration",
         Outcome.NOT_RECOVERED: "where nothing can follow the clock: not back at the end, or away "
         "by more than 10 tolerances or a quarter of the path's extent",
-        Outcome.CHATTERING: "a joint's velocity jumps back within 2 steps in more than 5 % of the "
-        "steps",
+        Outcome.CHATTERING: "a joint's velocity jumps back within 2 steps, or shakes at 10 Hz or "
+        "more by over 1 % of its limit, in more than 5 % of the steps",
         Outcome.SUCCESS: "the robot did its job",
         Outcome.RECOVERED: "nothing can follow the clock here; the robot gave way and came back",
     }

@@ -23,6 +23,7 @@ from dikbench.report.tables.every import make_tables
 from dikbench.report.tables.return_codes import return_codes
 from dikbench.report.tables.table import Table
 from dikbench.results.reading import Results
+from dikbench.statistics.failures import SKIPPED, has_failed
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,16 +68,19 @@ class Contents:
 
     @cached_property
     def counts(self) -> list[tuple[int, str]]:
-        """How many trials there are, and how they ended; what did not occur is left out."""
+        """How many trials were run, and how they ended; what did not occur is left out.
+
+        Skipped cells are no trials: they are counted apart.
+        """
         trials = self.results.trials
         status = trials["status"]
         formulations = trials[["formulation", "solver"]].drop_duplicates()
         seeds, scenarios = trials["seed"].nunique(), trials["scenario"].nunique()
         one = len(formulations) == 1
         found = [
-            (len(trials), "trial" if len(trials) == 1 else "trials"),
-            (int((~status.isin(["ok", "skipped"])).sum()), "failed"),
-            (int(status.eq("skipped").sum()), "skipped"),
+            (ran := int(status.ne(SKIPPED).sum()), "trial run" if ran == 1 else "trials run"),
+            (int(has_failed(trials).sum()), "failed"),
+            (left := int(status.eq(SKIPPED).sum()), f"{'cell' if left == 1 else 'cells'} skipped"),
             (missing(trials, self.manifest), "missing"),
             (
                 len(formulations),
@@ -85,7 +89,7 @@ class Contents:
             (scenarios, "scenario" if scenarios == 1 else "scenarios"),
             (seeds, "seed" if seeds == 1 else "seeds"),
         ]
-        return [(count, what) for count, what in found if count or what in {"trials", "failed"}]
+        return [(count, what) for count, what in found if count or what in {"trials run", "failed"}]
 
     @property
     def environment(self) -> list[tuple[str, str]]:

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner, Result
+from makers.rows import make_rows, write_results
 
 from dikbench.cli import commands
 from dikbench.metrics import METRICS
@@ -245,3 +246,10 @@ def test_what_cannot_be_compared(folder: Callable[..., Path], tmp_path: Path) ->
         f"error: file {tmp_path / 'x.txt'}: valid endings: .md, .csv\n",
     )
     assert dikbench(a, a, "--out", tmp_path / "missing" / "x.md").exit_code == 2
+
+
+def test_cells_that_both_skipped_are_no_trials_in_both(tmp_path: Path) -> None:
+    """They are counted apart."""
+    rows = make_rows({"a": {}, "b": {"status": "skipped", "outcome": ""}}, ("reach", "step"))
+    said = dikbench(write_results(tmp_path / "a", rows), tmp_path / "a").output
+    assert "2 trials in both, of which 2 ended ok in both. 2 cells skipped in both." in said

@@ -216,8 +216,8 @@ def check_accuracy(pair: Row, cases: list[tuple[Row, Row]]) -> None:
     weights = weights_of([a for a, _ in cases])
     kept = [w for (a, b), w in zip(cases, weights, strict=True) if done(a) and done(b)]
     errors = [
-        math.log(max(float(a["contour_error_6d_max_m"]), 1e-6))
-        - math.log(max(float(b["contour_error_6d_max_m"]), 1e-6))
+        math.log(max(float(a["contour_error_6d_max_m"]), 1e-5))
+        - math.log(max(float(b["contour_error_6d_max_m"]), 1e-5))
         for a, b in common
     ]
     assert int(pair["both"]) == len(common)
