@@ -29,7 +29,8 @@ point nearest to zero [rad or m]."""
 def safe_start(robot: Robot) -> Array:
     """Choose a well-conditioned posture (nq,) away from the limits, of 64 seeded ones.
 
-    It has the largest smallest singular value of the task Jacobian, times the smallest distance to
+    It has the largest smallest singular value of the task Jacobian, its
+    columns per `Robot.joint_scale`, times the smallest distance to
     a limit where that is below `SAFE_MARGIN_RAD`. Joints that do not move the task frame are in the
     middle of their ranges.
     """
@@ -57,7 +58,8 @@ def safe_start(robot: Robot) -> Array:
         assert at.to_lower is not None
         assert at.to_upper is not None
         margin = (np.minimum(at.to_lower, at.to_upper) / robot.joint_scale)[robot.chain].min()
-        sigma = smallest_singular_value(kinematics.task_jacobian()[:, robot.chain])
+        J = kinematics.task_jacobian() * robot.joint_scale
+        sigma = smallest_singular_value(J[:, robot.chain])
         merit = sigma * min(float(margin) / SAFE_MARGIN_RAD, 1.0)
         if merit > most:
             best, most = q, merit
