@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.problem.tasks.task import FrameTask, LinearizedTask, check_weight
+from dikbench.problem.tasks.task import FrameTask, LinearizedTask, check_rotation, check_weight
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.robot import Robot
 
@@ -43,6 +43,7 @@ class PoseTask(FrameTask):
             raise DikbenchError(
                 f"pose task: expected a pinocchio.SE3 as target, got {type(X_d).__name__}"
             )
+        check_rotation("pose task", X_d.rotation)
         check_weight("pose task", self.weight, len(robot.task_rows))
         relative = kinematics.placement(index).actInv(X_d)
         error: Array = pin.log6(relative).np

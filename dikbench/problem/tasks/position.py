@@ -13,6 +13,7 @@ from dikbench.errors import DikbenchError
 from dikbench.problem.tasks.task import (
     FrameTask,
     LinearizedTask,
+    check_rotation,
     check_weight,
     part_of_target,
 )
@@ -53,6 +54,7 @@ class PositionTask(FrameTask):
         if velocity is not None:
             if not isinstance(goal, pin.SE3):
                 raise DikbenchError("position task: the twist of a target needs its pinocchio.SE3")
+            check_rotation("position task", goal.rotation)
             V += X.rotation.T.dot(goal.rotation.dot(velocity.linear))
         J = kinematics.jacobian(index)
         return LinearizedTask(J[rows], V[rows], error[rows], self.weight, self.priority)
