@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
 import pytest
+from makers.scenarios import planar_scenario
 
 from dikbench import load_robot, solve_dik
 from dikbench.arrays import Array
@@ -15,6 +16,7 @@ from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_formulation
 from dikbench.problem import (
     DikProblem,
+    OrientationTask,
     PositionTask,
     PostureTask,
     ProblemPart,
@@ -133,8 +135,20 @@ def test_constraints_that_are_not_looked_at_are_refused() -> None:
         solve_dik(robot, robot.q0, formulation="dls", **arguments)
     assert solve_dik(robot, robot.q0, formulation="qp", **arguments).status.value == "ok"
     row = run_trial(Trial.of("dls", "torque-limited[robot=ur5]", "none"))
-    assert (row["status"], row["steps"]) == ("skipped", 0)
+    assert (row["status"], row["steps"], row["sees_constraints"]) == ("skipped", 0, False)
     assert "does not look at constraints" in row["message"]
+
+
+def test_no_formulation_is_blamed_for_a_target_that_is_none(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A scenario whose task cannot be posed is skipped with the reason."""
+    mirrored = OrientationTask(target=-np.eye(3), priority=2)
+    wrong = replace(planar_scenario(), tasks=(mirrored,))
+    monkeypatch.setattr("dikbench.run.trial_row.scenario_of", lambda selector, seed: wrong)
+    row = run_trial(Trial.of("dls", "near-miss", "none"))
+    assert (row["status"], row["steps"]) == ("skipped", 0)
+    assert "is not a rotation" in row["message"]
 
 
 @pytest.mark.parametrize(
