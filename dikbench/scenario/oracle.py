@@ -12,7 +12,7 @@ import pinocchio as pin
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.problem.tasks import PoseTask, TrackingTask
-from dikbench.robots.kinematics import Kinematics, smallest_singular_value
+from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.robot import Robot
 from dikbench.scenario.reference.reference import Reference
 
@@ -81,7 +81,7 @@ def solve_placement(
     Raises:
         DikbenchError: if the residual (m, rad) does not fall below 1e-9.
     """
-    kinematics = Kinematics(robot)
+    kinematics = Kinematics(robot, robot.scratch)
     q = seed
     error = np.inf
     for _ in range(iterations):
@@ -157,16 +157,16 @@ def measure_motion(
         [pin.difference(model, q[k], q[k + 1]) / period for k, period in enumerate(periods)]
     ).reshape(len(periods), robot.nv)
     kinematics = Kinematics(robot)
-    sigma, margin, reach = [], [], []
-    for sample in q:
+    jacobians, reach = np.empty((len(q), len(rows), robot.nv)), []
+    for k, sample in enumerate(q):
         kinematics.update(sample)
-        sigma.append(smallest_singular_value(kinematics.jacobian(robot.frame_id)[rows]))
-        margin.append(position_margin(robot, sample))
+        jacobians[k] = kinematics.jacobian(robot.frame_id)[rows]
         reach.append(robot.reach_of(kinematics.placement(robot.frame_id)))
+    sigma = np.linalg.svd(jacobians, compute_uv=False)[:, -1]
     limit = robot.limits.velocity
     ratio = np.zeros(len(v)) if limit is None else limit.usage(v).max(axis=1)
     return OracleMotion(
-        instants, q, v, np.array(sigma), ratio, np.array(margin), np.array(reach), exact
+        instants, q, v, sigma, ratio, _position_margins(robot, q), np.array(reach), exact
     )
 
 
@@ -175,7 +175,14 @@ def position_margin(robot: Robot, q: Array) -> float:
 
     Only joints that move the task frame count.
     """
-    limits, chain = robot.limits.at(q), robot.chain
-    if limits.to_lower is None or limits.to_upper is None:
-        return float("inf")
-    return float(min(limits.to_lower[chain].min(), limits.to_upper[chain].min()))
+    return float(_position_margins(robot, q[None])[0])
+
+
+def _position_margins(robot: Robot, q: Array) -> Array:
+    """Compute `position_margin` of each of several configurations (k, nq), (k,)."""
+    position, chain = robot.limits.position, robot.chain
+    if position is None:
+        return np.full(len(q), np.inf)
+    values = q[:, robot.limits.q_index[chain]]
+    inside = np.minimum(values - position.lower[chain], position.upper[chain] - values)
+    return inside.min(axis=1)
