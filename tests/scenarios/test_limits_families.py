@@ -16,6 +16,7 @@ from dikbench.parameters import Range
 from dikbench.plugins.building import make_plant, make_scenario
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
+from dikbench.scenario import joint_oracle
 from dikbench.simulation.closed_loop import simulate
 from dikbench.simulation.oracle_formulation import OracleFormulation
 from dikbench.solvers.checked_solve import make_solve
