@@ -162,7 +162,7 @@ def measure_motion(
         kinematics.update(sample)
         jacobians[k] = kinematics.jacobian(robot.frame_id)[rows]
         reach.append(robot.reach_of(kinematics.placement(robot.frame_id)))
-    sigma = np.linalg.svd(jacobians, compute_uv=False)[:, -1]
+    sigma = np.linalg.svd(jacobians, compute_uv=False)[:, -1].astype(np.float64, copy=False)
     limit = robot.limits.velocity
     ratio = np.zeros(len(v)) if limit is None else limit.usage(v).max(axis=1)
     return OracleMotion(
@@ -185,4 +185,5 @@ def _position_margins(robot: Robot, q: Array) -> Array:
         return np.full(len(q), np.inf)
     values = q[:, robot.limits.q_index[chain]]
     inside = np.minimum(values - position.lower[chain], position.upper[chain] - values)
-    return inside.min(axis=1)
+    margins: Array = inside.min(axis=1)
+    return margins
