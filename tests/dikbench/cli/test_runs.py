@@ -22,8 +22,7 @@ RUN = ("run", "--scenario", "reach[duration=0.1]", "--plant", "ideal", "--traces
 
 def run(out: Path, *options: str) -> tuple[int, str, str]:
     """Exit code, stdout and stderr of a run."""
-    with without_workers():
-        result = CliRunner().invoke(commands, [*RUN, "--jobs", "1", "--out", str(out), *options])
+    result = CliRunner().invoke(commands, [*RUN, "--jobs", "1", "--out", str(out), *options])
     return result.exit_code, result.stdout, result.stderr
 
 
