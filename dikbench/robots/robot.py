@@ -80,7 +80,7 @@ class Robot:
 
     @cached_property
     def scratch(self) -> Any:
-        """A `pinocchio.Data` for formulations that need more than the task Jacobian."""
+        """A `pinocchio.Data` for whoever reads its results before calling anything else."""
         return self.model.createData()
 
     @cached_property

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from makers.runs import without_workers
 
 import dikbench
 from dikbench.problem import tasks
@@ -100,13 +101,14 @@ def test_a_trial_in_other_words_is_the_same_trial(tmp_path: Path) -> None:
         "scenarios": "reach[robot=panda,duration=2e-1]",
     }
     how: dict[str, Any] = {"references": "time", "jobs": 1, "report": False}
-    one = dikbench.run_study(**plain, **how, out=tmp_path / "one")
-    again = dikbench.run_study(**spelt, **how, out=tmp_path / "one")
+    with without_workers():
+        one = dikbench.run_study(**plain, **how, out=tmp_path / "one")
+        again = dikbench.run_study(**spelt, **how, out=tmp_path / "one")
+        other = dikbench.run_study(**plain, **how, out=tmp_path / "other")
     assert list(again.trials["id"]) == list(one.trials["id"])
     assert list(again.trials["formulation"]) == ["dls[damping=0.05]"]
     assert missing(again.trials, again.manifest) == 0
     assert again.trials["formulation_time_median_us"].notna().all()
-    other = dikbench.run_study(**plain, **how, out=tmp_path / "other")
     matched = match_trials(again.trials, other.trials)
     assert len(matched.a) == 1
     assert len(matched.only_a) == len(matched.only_b) == 0

@@ -10,7 +10,7 @@ from dikbench.arrays import Array
 from dikbench.plugins.building import make_formulation, make_scenario
 from dikbench.plugins.finding import plugins
 from dikbench.problem import Kinematics, PoseTask, program_of, promises_of
-from dikbench.robots.catalogue import load_robot
+from dikbench.robots.loading import load_robot
 from dikbench.scenario import Certificate, Scenario, target_at_rest
 from dikbench.scenario.plant import Ideal
 from dikbench.simulation.closed_loop import simulate

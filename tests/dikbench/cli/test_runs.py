@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner
 from makers.plugins import law_with
+from makers.runs import without_workers
 
 import dikbench
 from dikbench.cli import commands
@@ -48,9 +50,10 @@ def test_the_oracle_is_not_missing_for_ever(tmp_path: Path, way: tuple[str, str]
     """It ran as it can; nothing of the plan is missing and no row is of an earlier run."""
     options = (*RUN[:1], "--scenario", "speed-sweep[speed=0.5,laps=1]", *way, "--traces", "none")
     names = ("--formulation", "oracle", "--formulation", "slowed-oracle", "--formulation", "dls")
-    result = CliRunner().invoke(
-        commands, [*options, *names, "--jobs", "1", "--out", str(tmp_path / "out")]
-    )
+    with without_workers():
+        result = CliRunner().invoke(
+            commands, [*options, *names, "--jobs", "1", "--out", str(tmp_path / "out")]
+        )
     assert result.exit_code == 0, result.output
     results = load_results(tmp_path / "out")
     assert len(results.trials) == results.manifest["trials"] > 2
@@ -66,8 +69,8 @@ def test_empty_axes_are_the_study_s_own(tmp_path: Path) -> None:
         'description = "mine"\nscenarios = ["reach[duration=0.1]"]\nplants = ["ideal"]\n'
         'seeds = [3]\n[[cells]]\nformulations = ["dls"]\n'
     )
-    results = dikbench.run_study(
-        study, formulations=[], seeds=[], scenarios=(), out=tmp_path / "out", jobs=1, report=False
-    )
+    chosen: dict[str, Any] = {"formulations": [], "seeds": [], "scenarios": ()}
+    with without_workers():
+        results = dikbench.run_study(study, **chosen, out=tmp_path / "out", jobs=1, report=False)
     assert results.trials[["formulation", "seed"]].to_numpy().tolist() == [["dls", 3]]
     assert json.loads((tmp_path / "out" / "manifest.json").read_text())["trials"] == 1

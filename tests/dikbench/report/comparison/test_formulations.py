@@ -7,6 +7,7 @@ import io
 import json
 import math
 import random
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -99,8 +100,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@cache
 def dikbench(*arguments: object) -> Result:
-    """`dikbench compare` with the arguments."""
+    """`dikbench compare` with the arguments; it only reads, but for files that are asked for."""
     return CliRunner().invoke(commands, ["compare", *map(str, arguments)])
 
 
