@@ -13,6 +13,7 @@ from __future__ import annotations
 import pickle
 from collections.abc import Callable
 from dataclasses import is_dataclass, replace
+from itertools import chain
 from math import isfinite, isnan, nan
 from types import UnionType
 from typing import Any, Final, Union, get_args, get_origin
@@ -24,8 +25,9 @@ from dikbench.errors import DikbenchError, in_words
 from dikbench.parameters import Parameter, parameters_of
 from dikbench.scenario.certificate import CertificateFailed
 from dikbench.scenario.family import Family
+from dikbench.scenario.misfits import misfits
 from dikbench.scenario.scenario import Scenario
-from dikbench.testing.fitting import misfits
+from dikbench.testing.first_step import no_first_step
 
 SEEDS: Final = (0, 1, 2)
 """The seeds of the scenarios that are checked; 0 perturbs nothing."""
@@ -56,7 +58,7 @@ def check_family_ranges(family: Family) -> None:
     What is outside of a range, and NaN, must be refused by an error that names the parameter.
     """
     for name, parameter in parameters_of(type(family)).items():
-        if not _is_of(parameter, int, float):
+        if not parameter.numeric:
             continue
         if parameter.range is None:
             raise AssertionError(f"{name} is a number without a Range")
@@ -133,7 +135,7 @@ def check_family_parts(family: Family) -> None:
     for seed in SEEDS:
         made = _scenario(family, seed)
         try:
-            wrong = next(misfits(made), "")
+            wrong = next(chain(misfits(made), no_first_step(made)), "")
         except MemoryError:
             raise
         except Exception as error:
