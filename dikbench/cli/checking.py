@@ -107,5 +107,11 @@ def _of_plugin(name: str, solver: str | None) -> Iterator[Line]:
         raise DikbenchError(f"--solver {solver}: {name} is a scenario family, which needs none")
     else:
         verdicts = verdicts_on_family(make_family(name))
+    unchecked: dict[str, list[str]] = {}
     for verdict in verdicts:
-        yield verdict.outcome, verdict.check, verdict.reason
+        if verdict.outcome == "not checked":
+            unchecked.setdefault(verdict.reason, []).append(verdict.check)
+        else:
+            yield verdict.outcome, verdict.check, verdict.reason
+    for reason, checks in unchecked.items():
+        yield "not checked", ", ".join(checks), reason

@@ -27,6 +27,7 @@ from dikbench.scenario.certificate import CertificateFailed
 from dikbench.scenario.family import Family
 from dikbench.scenario.misfits import misfits
 from dikbench.scenario.scenario import Scenario
+from dikbench.testing.cannot_check import CannotCheck
 from dikbench.testing.first_step import no_first_step
 
 SEEDS: Final = (0, 1, 2)
@@ -78,7 +79,8 @@ def check_family_ranges(family: Family) -> None:
             except DikbenchError:
                 pass  # it says why there is no such scenario
             except Exception as error:
-                raise AssertionError(f"{name}={value}: raised {in_words(error)}") from error
+                said = in_words(error)
+                raise CannotCheck(f"{name}={value}: raised {said}", said) from error
 
 
 def _changed(family: Family, name: str, value: object) -> Family:
@@ -193,9 +195,10 @@ def _scenario(family: Family, seed: int) -> Scenario:
     except MemoryError:
         raise
     except DikbenchError as error:
-        raise AssertionError(f"seed {seed}: {error}") from error
+        raise CannotCheck(f"seed {seed}: {error}", str(error)) from error
     except Exception as error:
-        raise AssertionError(f"seed {seed}: raised {in_words(error)}") from error
+        said = in_words(error)
+        raise CannotCheck(f"seed {seed}: raised {said}", said) from error
 
 
 def _difference(a: Scenario, b: Scenario) -> str:
