@@ -71,10 +71,10 @@ def _of_study(benchmark: str, out: Path | None, jobs: int | None) -> Iterator[Li
     from dikbench.invariants import check_benchmark
     from dikbench.run.pool import available_cores
     from dikbench.run.runner import RunSettings
-    from dikbench.study.study import load_study
+    from dikbench.study.study import CHECKED, load_study
 
     study = load_study(benchmark)
-    folder = out or Path("runs") / f"check-{study.name}"
+    folder = out or Path("runs") / f"{CHECKED}{study.name}"
     settings = RunSettings(jobs=jobs or available_cores(), traces="none")
     command = shlex.join(["dikbench", *sys.argv[1:]])
     for checked in check_benchmark(study, folder, settings, command):

@@ -37,6 +37,9 @@ DEFAULT_STUDY = "quick"
 SELECTED: Final = "selection"
 """The name of a study that was selected without naming one."""
 
+CHECKED: Final = "check-"
+"""What the name of a study begins with that is run with straw laws."""
+
 KIND_OF_AXIS: Final[Mapping[str, Literal["formulation", "scenario", "plant"]]] = MappingProxyType(
     {"formulations": "formulation", "scenarios": "scenario", "plants": "plant"}
 )
