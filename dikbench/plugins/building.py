@@ -142,7 +142,10 @@ def _built(
     values = _values(what, parameters, selector)
     for name, parameter in parameters.items():
         if parameter.required and name not in values:
-            raise DikbenchError(f"{what}: parameter {name!r} must be given")
+            raise DikbenchError(
+                f"{what}: parameter {name!r} must be given; valid: "
+                f"{selector.name}[{name}=...], {parameter.valid}"
+            )
     try:
         made = make(**values)
         check_parameters(made)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from dikbench.cli.listing import description
+from dikbench.cli.describing import description
 from dikbench.errors import DikbenchError
 from dikbench.plugins.finding import plugins
 from dikbench.scenario.oracle import ORACLES
