@@ -186,8 +186,9 @@ class Parameter:
 
     @property
     def numeric(self) -> bool:
-        """Whether it is a number, or may be one."""
-        return any(part in (int, float) for part in (self.type, *typing.get_args(self.type)))
+        """Whether it is a number, or may be one; what may be a text too is checked by its class."""
+        kinds = (self.type, *typing.get_args(self.type))
+        return any(part in (int, float) for part in kinds) and str not in kinds
 
     @property
     def hidden(self) -> bool:

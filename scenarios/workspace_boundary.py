@@ -69,7 +69,7 @@ class WorkspaceBoundary(Family):
         """See `Family`."""
         q0 = change.posture(robot, robot.q0)
         start = placement_of(robot, q0)
-        origin = robot.model.jointPlacements[1].translation
+        origin = robot.shoulder
         ray = start.translation - origin
         first = float(np.linalg.norm(ray))
         ray /= first

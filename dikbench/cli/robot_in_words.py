@@ -9,8 +9,9 @@ from xml.etree import ElementTree
 import numpy as np
 
 from dikbench.arrays import Array
-from dikbench.robots.catalogue import ROBOTS, load_robot
+from dikbench.robots.catalogue import ROBOTS
 from dikbench.robots.limits import Interval
+from dikbench.robots.loading import load_robot
 from dikbench.robots.robot import Robot
 
 ROBOT_FILES: Final = (".urdf", ".xml")
@@ -85,10 +86,12 @@ def _joints(robot: Robot) -> list[str]:
         (_symmetric(robot.available_acceleration), "acceleration", ("rad/s^2", "m/s^2")),
         (_symmetric(robot.available_effort), "torque or force", ("N m", "N")),
     ]
-    lines = []
-    for name, joint in zip(model.names, model.joints, strict=True):
-        if joint.nv == 0 or joint.idx_v < 0:
+    lines, free = [], dict[int, str]()
+    for name, joint in [*zip(model.names, model.joints, strict=True)][1:]:
+        if joint.nv == 0:
+            lines.append(f"{name} follows {free[joint.idx_v]}")
             continue
+        free[joint.idx_v] = name
         slides = joint.nv == 1 and joint.shortname().startswith("JointModelP")
         kind = "slides" if slides else "turns" if joint.nv == 1 else f"{joint.nv} velocities"
         if joint.nv == 1 and joint.nq == 2:
@@ -116,7 +119,8 @@ def _frames(robot: Robot) -> list[str]:
     model: Any = robot.model
     counts = {}
     for frame in model.frames:
-        moving = [model.joints[index] for index in model.supports[frame.parentJoint]]
+        above = [model.joints[index] for index in model.supports[frame.parentJoint]][1:]
         if frame.name != "universe":
-            counts[frame.name] = sum(joint.nv for joint in moving if joint.idx_v >= 0)
+            moving = {joint.idx_v + k for joint in above for k in range(joint.nvExtended)}
+            counts[frame.name] = len(moving)
     return [f"{name} ({count})" for name, count in counts.items()]

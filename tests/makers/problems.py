@@ -21,8 +21,8 @@ from dikbench.problem import (
     program_of,
 )
 from dikbench.programs.quadratic_program import QuadraticProgram
-from dikbench.robots.catalogue import load_robot
 from dikbench.robots.limits import JointLimits
+from dikbench.robots.loading import load_robot
 from dikbench.robots.planar_arm import planar_arm
 from dikbench.robots.robot import model_limits
 from dikbench.solvers.catalogue.back_ends import parse_solver

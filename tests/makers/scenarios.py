@@ -15,7 +15,7 @@ from dikbench.errors import DikbenchError
 from dikbench.metrics import evaluate, motion_of
 from dikbench.plugins.building import make_formulation, make_plant, make_scenario
 from dikbench.problem import DikProblem, Formulation, PoseTask, Solve
-from dikbench.robots.catalogue import load_robot
+from dikbench.robots.loading import load_robot
 from dikbench.scenario import (
     Certificate,
     Robot,

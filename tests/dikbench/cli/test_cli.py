@@ -99,7 +99,7 @@ MALFORMED = [
     (("recompute", "nowhere"), ("no results", "nowhere")),
     (("list", "laws"), ("laws", "formulations")),
     (("show", "nowhere.urdf"), ("robot file not found: nowhere.urdf",)),
-    (("show", "bad.urdf"), ("bad.urdf is not a URDF that Pinocchio reads",)),
+    (("show", "bad.urdf"), ("robot file bad.urdf: not a URDF that Pinocchio reads",)),
     (("show", "csv[file=none.csv]"), ("none.csv",)),
     (("check", "csv"), ("'file' must be given; valid: csv[file=...], a text",)),
     (("run", "--scenario", "csv"), ("valid: csv[file=...], a text",)),
@@ -144,6 +144,7 @@ SHOWN = {
     "near-miss[miss=0.04]": "outcome left-path: farther from the path",
     "ur5": "wrist_3_joint (5): turns; position -6.283 to 6.283 rad; speed 3.2 rad/s; acceleration",
     "gantry.urdf": "rail (0): slides; position -1 to 2 m; speed 0.5 m/s; torque or force 30 N",
+    "././gantry.urdf": "flap follows rail",
     "./gantry.urdf": "wheel (1): turns without end; position -inf to inf rad; speed 2 rad/s",
 }
 
@@ -213,6 +214,11 @@ GANTRY = """
   </joint>
   <joint name="wheel" type="continuous">
     <parent link="cart"/><child link="hand"/><axis xyz="0 0 1"/><limit velocity="2" effort="5"/>
+  </joint>
+  <link name="mirror"/>
+  <joint name="flap" type="revolute">
+    <parent link="cart"/><child link="mirror"/><axis xyz="0 1 0"/><mimic joint="rail"/>
+    <limit lower="-1" upper="2" velocity="2" effort="5"/>
   </joint>
   <joint name="mount" type="fixed"><parent link="cart"/><child link="camera"/></joint>
 </robot>

@@ -18,7 +18,7 @@ from dikbench.report.tables.failures import (
     QUANTITIES,
     failures,
 )
-from dikbench.robots.catalogue import load_robot
+from dikbench.robots.loading import load_robot
 from dikbench.scenario.violation import Violation, broken_limit, collision
 
 SPEED = {
