@@ -111,11 +111,18 @@ MALFORMED = [
     (("show", "panda[x=1]"), ("panda has no parameters", "valid in brackets")),
     (("show", "lag_max_s[x=1]"), ("lag_max_s has no parameters",)),
     (("show", "nofile.py:Family"), ("error: file not found: nofile.py",)),
-    (("show", "bad.py"), ("bad.py names a file without a class; valid: bad.py:Law, bad.py:Way",)),
+    (
+        ("show", "bad.py"),
+        ("bad.py names a file without a class; valid: bad.py:Law, bad.py:Thawed, bad.py:Way",),
+    ),
     (("check", "bad.py"), ("valid: bad.py:Law",)),
     (("run", "--scenario", "bad.py"), ("bad.py:Way",)),
     (("run", "--formulation", "bad.py"), ("bad.py:Law",)),
-    (("run", "--formulation", "bad.py:Low"), ("'Low'", "did you mean 'Law'", "valid: Law, Way")),
+    (("run", "--formulation", "bad.py:Thawed"), ("bad.py:Thawed", "@dataclass(frozen=True)")),
+    (
+        ("run", "--formulation", "bad.py:Low"),
+        ("'Low'", "did you mean 'Law'", "valid: Law, Thawed, Way"),
+    ),
     (("run", "bad.toml"), ("study bad.toml: cells[0].formulations: ", "damping='x'", "a number")),
     (("--plnt",), ("--plnt",)),
 ]
@@ -180,6 +187,11 @@ from scenarios.reach import Reach
 
 @dataclass(frozen=True)
 class Law:
+    def velocity(self, problem, solve):
+        return problem.q
+
+@dataclass
+class Thawed:
     def velocity(self, problem, solve):
         return problem.q
 
