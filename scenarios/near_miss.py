@@ -286,5 +286,12 @@ def _claims(
 
 
 def _distance_from(where: Singularity, q: Array, arm: Robot) -> float:
-    """Compute the twist's length (m, rad) from the singular placement to that of q."""
-    return float(np.linalg.norm(pin.log6(where.placement.actInv(placement_of(arm, q))).np))
+    """Compute the twist's length (m, rad) from the singular placement to that of q.
+
+    Of rows that are not asked for nothing is said.
+    """
+    twist = pin.log6(where.placement.actInv(placement_of(arm, q))).np
+    if arm.task_axes == "world":
+        R = where.placement.rotation
+        twist = np.concatenate([R @ twist[:3], R @ twist[3:]])
+    return float(np.linalg.norm(twist[list(arm.task_rows)]))
