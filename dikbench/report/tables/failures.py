@@ -118,28 +118,28 @@ class Failures:
 def failures(trials: pd.DataFrame) -> Failures:
     """List the failed trials, worst first: by outcome, then by the figure over its limit.
 
-    They are those of the table of outcomes, and all that did not run.
+    Those of the table of outcomes, and all that did not run, come before the trials that do not
+    count, of scenarios that no known motion can do.
 
     Args:
         trials: the rows of trials.csv.
     """
     counted = rows_of_all({setting: judged_rows(trials, setting) for setting in SETTINGS})
-    facts = ran(with_facts(trials))
-    broke_off = facts["outcome"].eq(Outcome.DID_NOT_RUN.value)
-    broke_off &= facts["plant"].eq(judged_plant(trials))
-    rows = pd.concat([counted, facts[broke_off & ~facts.index.isin(counted.index)]])
-    failed = rows[~succeeded(rows)]
+    rows = ran(with_facts(trials))
+    rows = rows[rows["plant"].eq(judged_plant(trials)) & rows["outcome"].isin(list(_SEVERITY))]
+    broke_off = rows["outcome"].eq(Outcome.DID_NOT_RUN.value)
+    rows = rows.assign(counts=rows.index.isin(counted.index) | broke_off)
     if not len(rows):
         return Failures(pd.DataFrame(), NO_OUTCOMES)
-    if not len(failed):
-        return Failures(pd.DataFrame(), f"None of the {len(rows)} trials that count failed.")
+    failed = rows[~succeeded(rows)]
     records: list[Any] = failed.to_dict("records")
     order = pd.DataFrame(
         {
+            "uncounted": ~failed["counts"].to_numpy(),
             "severity": failed["outcome"].map(_SEVERITY).to_numpy(),
             "ratio": [-_ratio(row) for row in records],
         }
-    ).sort_values(["severity", "ratio"], kind="stable")
+    ).sort_values(["uncounted", "severity", "ratio"], kind="stable")
     worst_first = failed.iloc[order.index]
     number = worst_first.groupby(_CASE, sort=False)["id"].transform("size")
     cases = worst_first.assign(number=number).drop_duplicates(_CASE)
@@ -147,19 +147,28 @@ def failures(trials: pd.DataFrame) -> Failures:
     told_rows: list[Any] = told.to_dict("records")
     return Failures(
         pd.DataFrame([_told(row) for row in told_rows]),
-        _note(len(rows), len(failed), len(cases), len(told)),
+        _note(rows["counts"], failed["counts"], len(cases), len(told)),
     )
 
 
-def _note(counted: int, failed: int, cases: int, told: int) -> str:
-    text = (
-        f"{failed} of {counted} trials that count failed. Worst first: each case is the worst "
-        "trial of a formulation, scenario and outcome, at the step that decided"
+def _note(rows: pd.Series, failed: pd.Series, cases: int, told: int) -> str:
+    """Say how many trials failed, by whether they count, and what is shown of them."""
+    text = f"{int(failed.sum()) or 'None'} of {int(rows.sum())} trials that count failed"
+    if others := int((~failed).sum()):
+        text += (
+            f", and {others} of {int((~rows).sum())} of scenarios of which no motion is known that "
+            "keeps all limits, which do not count"
+        )
+    if not cases:
+        return f"{text}."
+    text += (
+        ". Worst first: each case is the worst trial of a formulation, scenario and outcome, at "
+        "the step that decided"
     )
     if told < cases:
         text += (
             f", at most {CASES_OF_EACH} of a formulation with its solver; {cases - told} more "
-            f"case{'s' if cases - told > 1 else ''} are left out here"
+            f"case{'s are' if cases - told > 1 else ' is'} left out here"
         )
     return (
         f"{text}. Every trial stands in `trials.csv` (`outcome_step`, `outcome_figure`, "
@@ -205,7 +214,7 @@ def _told(row: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "formulation": contender_name(row["formulation"], row["solver"]),
         "scenario": row["scenario"],
-        "outcome": row["outcome"],
+        "outcome": row["outcome"] + ("" if row["counts"] else " (does not count)"),
         "at step": f"{step} of {int(row['steps'])}" if step >= 0 else "",
         "what": short if quantity is None else quantity.name,
         "figure": figure,

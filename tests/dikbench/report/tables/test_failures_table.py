@@ -127,7 +127,7 @@ def test_who_does_not_come_back_is_held_against_the_bound_of_recovery(
 
 
 def test_what_did_not_run_is_told_with_its_message_whatever_is_known_of_its_scenario() -> None:
-    """Other trials of scenarios that nothing is known to do do not count."""
+    """Other trials of scenarios that nothing is known to do come last, and do not count."""
     broke_off = {
         "status": "crashed", "message": "the worker ended | with exit code -11",
         "outcome": "did-not-run", "outcome_step": nan, "steps": 0, "feasible": "",
@@ -136,7 +136,21 @@ def test_what_did_not_run_is_told_with_its_message_whatever_is_known_of_its_scen
     (case,) = told(make_rows({"a": broke_off}))
     assert case["what"] == broke_off["message"]
     assert case["at step"] == case["figure"] == case["at most"] == ""
-    assert told(make_rows({"a": unknown, "b": {}})) == []
+    rows = make_rows({"a": unknown, "b": {}})
+    (case,) = told(rows)
+    assert case["outcome"] == "left-path (does not count)"
+    assert failures(rows).note.startswith(
+        "None of 0 trials that count failed, and 1 of 2 of scenarios of which no motion is known"
+    )
+    fast = {**SPEED, "feasible": "no"}
+    both = make_rows(
+        {"a": {name: [fast[name], LEFT.get(name, fast[name])] for name in fast}},
+        ("reach[distance=0.1]", "reach"),
+    )
+    both.loc[both["scenario"] == "reach", "feasible"] = "time"
+    assert [case["outcome"] for case in told(both)] == [
+        "left-path", "limit-broken (does not count)",
+    ]  # fmt: skip
 
 
 @settings(max_examples=15)
@@ -163,7 +177,7 @@ def test_a_readable_number_is_shown_and_the_rest_is_counted(counts: list[int], s
     shown = min(CASES, sum(min(CASES_OF_EACH, count) for count in counts))
     assert len(found.cases) == shown
     if not sum(counts):
-        assert f"None of the {len(rows)} trials" in found.note
+        assert found.note == f"None of {len(rows)} trials that count failed."
         return
     assert found.note.startswith(f"{seeds * sum(counts)} of {len(rows)} trials that count failed.")
     left_out = sum(counts) - shown
