@@ -187,7 +187,8 @@ class Parameter:
     @property
     def numeric(self) -> bool:
         """Whether it is a number, or may be one; what may be a text too is checked by its class."""
-        kinds = (self.type, *typing.get_args(self.type))
+        union = typing.get_origin(self.type) in (Union, UnionType)
+        kinds = typing.get_args(self.type) if union else (self.type,)
         return any(part in (int, float) for part in kinds) and str not in kinds
 
     @property
