@@ -141,7 +141,7 @@ class Judgement:
 
     def _not_recovered(self, tolerance: float) -> Iterator[Verdict]:
         """What keeps a robot from having given way and come back, where nothing could follow."""
-        bound = min(RECOVERY_TOLERANCES * tolerance, RECOVERY_SHARE * self.extent)
+        bound = self.recovery_bound(tolerance)
         cut = "tolerance [m] at which 99% of the path are done"
         for step, figure, most, reason in (
             (self.end.step, self.end.figure, tolerance, self.end.reason),
@@ -150,6 +150,10 @@ class Judgement:
         ):
             if not figure <= most:
                 yield Verdict(Outcome.NOT_RECOVERED, step, figure, reason)
+
+    def recovery_bound(self, tolerance: float) -> float:
+        """Return how far [m] who recovers may be off the path, and the cut, at a tolerance [m]."""
+        return min(RECOVERY_TOLERANCES * tolerance, RECOVERY_SHARE * self.extent)
 
     def columns(self, tolerance: float) -> dict[str, Any]:
         """Return what a row of results keeps: the outcome at a tolerance [m], and all of `at`."""

@@ -43,8 +43,14 @@ def test_python_m_dikbench_is_the_command() -> None:
 
 
 def test_a_study_runs_from_a_script_as_from_the_command_line(tmp_path: Path) -> None:
-    """Also from one without `if __name__ == "__main__"`, which new processes would run again."""
+    """Also from one without `if __name__ == "__main__"`, which new processes would run again.
+
+    Folders beside it that are called as dikbench's own are do not hide those.
+    """
     script = tmp_path / "script.py"
+    for name in ("formulations", "scenarios"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "__init__.py").touch()
     script.write_text(
         "import dikbench\n"
         "chosen = {'formulations': 'dls', 'scenarios': 'reach[duration=0.2]'}\n"

@@ -20,6 +20,7 @@ from dikbench.report.drawing.figure import Figure
 from dikbench.report.sentences.limitations import Limitation, limitations, missing
 from dikbench.report.sentences.summary import Summary, summarise
 from dikbench.report.tables.every import make_tables
+from dikbench.report.tables.failures import Failures, failures
 from dikbench.report.tables.return_codes import return_codes
 from dikbench.report.tables.table import Table
 from dikbench.results.reading import Results
@@ -34,6 +35,7 @@ class Contents:
         results: what it is about.
         summary: what a person reads first.
         tables: success, outcomes, tracking error, limit violation, timing, solvers.
+        failures: the worst failed trials.
         return_codes: a row per solver.
         families: the scenario families of the run.
         formulations: its formulations.
@@ -44,6 +46,7 @@ class Contents:
     results: Results
     summary: Summary
     tables: Sequence[Table]
+    failures: Failures
     return_codes: pd.DataFrame
     families: Sequence[Family]
     formulations: Sequence[FormulationOfRun]
@@ -132,6 +135,7 @@ def gather(results: Results, figures: Sequence[Figure]) -> Contents:
         results,
         summarise(trials),
         make_tables(trials),
+        failures(trials),
         return_codes(trials),
         families_of(trials),
         formulations_of(trials),

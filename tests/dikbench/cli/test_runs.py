@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,10 @@ from makers.runs import without_workers
 
 import dikbench
 from dikbench.cli import commands
+from dikbench.invariants import with_straw_laws
 from dikbench.report.sentences.limitations import in_plan, missing
 from dikbench.results.reading import load_results
+from dikbench.study.study import load_study
 
 RUN = ("run", "--scenario", "reach[duration=0.1]", "--plant", "ideal", "--traces", "none")
 
@@ -74,3 +77,50 @@ def test_empty_axes_are_the_study_s_own(tmp_path: Path) -> None:
         results = dikbench.run_study(study, **chosen, out=tmp_path / "out", jobs=1, report=False)
     assert results.trials[["formulation", "seed"]].to_numpy().tolist() == [["dls", 3]]
     assert json.loads((tmp_path / "out" / "manifest.json").read_text())["trials"] == 1
+
+
+STUDY = """
+description = "mine"
+scenarios = ["reach[duration=0.1]"]
+plants = ["ideal"]
+[[cells]]
+formulations = ["dls"]
+"""
+
+
+def test_a_folder_holds_one_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another study, its times and a check with straw laws are refused in one line.
+
+    The same study goes on in it, and what is selected by options may be added, but not to what was
+    run with straw laws: its tables would be taken for those of a study.
+    """
+    monkeypatch.chdir(tmp_path)
+    for name in ("mine", "check-mine"):
+        Path(f"{name}.toml").write_text(STUDY)
+    Path("other.toml").write_text(STUDY + '[timing]\nreference = "dls"\n')
+
+    def ran(*study: str, **axes: str) -> int:
+        done = dikbench.run_study(*study, **axes, out="out", jobs=1, traces="none", report=False)  # type: ignore[arg-type]
+        return len(done.trials)
+
+    def refused(there: str, *arguments: str) -> None:
+        result = CliRunner().invoke(commands, [*arguments, "--out", "out"])
+        (line,) = result.stderr.splitlines()
+        assert result.exit_code == 2, line
+        assert f"out holds the results of study {there!r}" in line
+        assert "valid: another folder with --out" in line
+
+    assert ran("mine.toml") == 1
+    before = Path("out/trials.csv").read_bytes()
+    refused("mine", "run", "other.toml")
+    refused("mine", "time", "other.toml")
+    refused("mine", "check", "--benchmark", "mine.toml")
+    refused("mine", "check", "--benchmark", "other.toml")
+    assert Path("out/trials.csv").read_bytes() == before
+    assert ran("mine.toml") == 1
+    assert ran(formulations="pinv", scenarios="reach[duration=0.1]", plants="ideal") == 3
+    shutil.rmtree("out")
+    ran("check-mine.toml")  # as the check names what it runs
+    refused("check-mine", "run", "mine.toml")
+    refused("check-mine", *RUN, "--formulation", "pinv")
+    assert with_straw_laws(load_study("mine.toml")).name == "check-mine"

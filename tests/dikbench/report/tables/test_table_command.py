@@ -41,6 +41,15 @@ def test_columns_and_formulations_are_chosen_in_the_order_given(folder: Path) ->
     assert lines[-1] == "Too few cases for stars: free space (2 scenarios)."
 
 
+def test_a_table_without_rows_says_why(tmp_path: Path) -> None:
+    """And not that the formulations of the run are unknown."""
+    nothing_known = make_rows({"dls": {"feasible": "unknown"}})
+    folder = write_results(tmp_path / "out", nothing_known)
+    answer = _table(str(folder), "--table", "success", "--formulations", "dls")
+    assert answer.exit_code == 2
+    assert "the table success has no rows: Nothing can be said of success" in answer.stderr
+
+
 def test_names_of_ones_own(folder: Path, tmp_path: Path) -> None:
     """In every format; what has none keeps its own."""
     names = tmp_path / "names.toml"

@@ -6,7 +6,7 @@ import re
 
 from makers.rows import random_rows
 
-from dikbench.cli.listing import description
+from dikbench.cli.describing import description
 from dikbench.metrics import METRICS
 from dikbench.report.tables.build import make_table
 from dikbench.report.tables.csv_table import to_csv
