@@ -28,6 +28,7 @@ DONE_SHARE: Final = 0.99
 class Outcome(StrEnum):
     """The outcomes of a trial, in the order in which they are asked for; the first one counts."""
 
+    DOES_NOT_SEE = "does-not-see"
     DID_NOT_RUN = "did-not-run"
     DIVERGED = "diverged"
     COLLIDED = "collided"
@@ -43,6 +44,8 @@ class Outcome(StrEnum):
 
 OUTCOME_SENTENCES: Final[Mapping[Outcome, str]] = MappingProxyType(
     {
+        Outcome.DOES_NOT_SEE: "not run: the formulation does not look at the distances or torques "
+        "that are limited here",
         Outcome.DID_NOT_RUN: "the run broke off: an error, a crash, no time or memory left",
         Outcome.DIVERGED: "the motion left all bounds",
         Outcome.COLLIDED: "a distance fell more than 1 mm below its margin",

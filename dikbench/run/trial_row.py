@@ -145,7 +145,10 @@ def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "al
         "sees_lower_tasks": None if oracle else sees_lower_tasks(formulation, problem),
     }
     if reason:
-        return {**row_without_run(trial, Status.SKIPPED, reason), **sight}
+        row = {**row_without_run(trial, Status.SKIPPED, reason), **sight}
+        if sight["sees_constraints"] is False:
+            row["outcome"] = row["decided_before"] = Outcome.DOES_NOT_SEE.value
+        return row
     plant = make_plant(trial.plant)
     mode: ReferenceMode = "path" if trial.reference == "path" else "time"
     start = perf_counter()

@@ -18,7 +18,7 @@ import pandas as pd
 from dikbench.arrays import Array, Mask
 from dikbench.metrics import Judgement, Outcome
 from dikbench.scenario.oracle import ORACLES
-from dikbench.statistics.failures import ran
+from dikbench.statistics.failures import SKIPPED
 from dikbench.statistics.hierarchical_bootstrap import INTERVAL_COVERAGE, draw_weights
 from dikbench.statistics.trial_matrix import TrialMatrix
 
@@ -53,13 +53,14 @@ def counted(trials: pd.DataFrame, setting: Setting) -> pd.DataFrame:
     """Return the trials that count in a setting.
 
     They are those with this reference, and in both settings those of targets at rest, of scenarios
-    that a known motion can do.
+    that a known motion can do. Where a formulation was skipped since it does not see the distances
+    or torques, it did not succeed.
 
     Args:
         trials: rows of one plant, with the facts of their scenarios.
         setting: whether the path may wait.
     """
-    rows = ran(trials)
+    rows = trials[trials["outcome"].eq(Outcome.DOES_NOT_SEE) | ~trials["status"].eq(SKIPPED)]
     at_rest = rows["judged_by_path"].eq(0) & rows["reference"].eq("time")
     feasible = rows["feasible"].isin(["time", "path"])
     found: pd.DataFrame = rows[feasible & (rows["reference"].eq(setting) | at_rest)]

@@ -38,6 +38,7 @@ CATEGORIES: Final = (
     ),
     Category("limit broken", frozenset({Outcome.LIMIT_BROKEN}), "#D55E00", "v"),
     Category("collided", frozenset({Outcome.COLLIDED}), "#8C2D04", "c"),
+    Category("does not see them", frozenset({Outcome.DOES_NOT_SEE}), "#BBBBBB", "-"),
     Category(
         "broke off", frozenset({Outcome.DIVERGED, Outcome.DID_NOT_RUN}), "#222222", "x"
     ),

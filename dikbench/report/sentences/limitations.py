@@ -13,7 +13,7 @@ from dikbench.report.sentences.words import NOT_TIMED, listed, number, quoted, s
 from dikbench.scenario.oracle import ORACLE
 from dikbench.scenario.plant import PLANTS, REFERENCE_MODES
 from dikbench.selector import parse_selector
-from dikbench.solvers.catalogue.back_ends import BACK_ENDS, is_installed
+from dikbench.solvers.catalogue.back_ends import BACK_ENDS, DEFAULT_SOLVER, is_installed
 from dikbench.statistics.failures import SKIPPED, has_failed
 from dikbench.statistics.stability import STABLE
 from dikbench.statistics.trial_matrix import CONTENDER
@@ -99,7 +99,7 @@ def in_plan(trials: pd.DataFrame, study: Mapping[str, Any]) -> pd.Series:
             (formulation, solver)
             for cell in cells
             for formulation in cell["formulations"]
-            for solver in (*cell.get("solvers", ()), "none")
+            for solver in (*(cell.get("solvers") or DEFAULT_SOLVER.values()), "none")
         }
         pairs = zip(trials["formulation"], trials["solver"], strict=True)
         inside &= pd.Series([pair in asked for pair in pairs], trials.index)
