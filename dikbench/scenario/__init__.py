@@ -63,7 +63,8 @@ from dikbench.scenario.oracle import (
 from dikbench.scenario.reference.curves import circle, lemniscate, plane_of
 from dikbench.scenario.reference.pose_file import PoseFile, read_poses
 from dikbench.scenario.reference.reference import Reference, joint_path, screw_path, target_at_rest
-from dikbench.scenario.reference.waypoints import through
+from dikbench.scenario.reference.spline import spline_through
+from dikbench.scenario.reference.waypoints import held, through
 from dikbench.scenario.scenario import Scenario
 from dikbench.scenario.singularity import (
     Kind,
@@ -125,6 +126,7 @@ __all__ = [
     "duration_at",
     "effort_limits",
     "from_rest_to_rest",
+    "held",
     "influence_distance",
     "joint_oracle",
     "joint_path",
@@ -146,6 +148,7 @@ __all__ = [
     "singular_postures",
     "smallest_singular_value",
     "solve_placement",
+    "spline_through",
     "start_velocity",
     "step_claims",
     "target_at_rest",

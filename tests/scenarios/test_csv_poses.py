@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib.metadata
+import re
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +15,12 @@ from makers.scenarios import metrics_of, put_robot, scenario_error
 
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_scenario
+from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
+from dikbench.scenario import Scenario, placement_of, solve_placement
 
-TRIANGLE = Path(__file__).parents[1] / "data" / "triangle.csv"
+DATA = Path(__file__).parents[1] / "data"
+TRIANGLE = DATA / "triangle.csv"
 HEADER = "t,x,y,z,qx,qy,qz,qw"
 OUT_OF_REACH = "the pose or the path to it is out of reach of robot panda"
 
@@ -44,15 +49,136 @@ def test_the_example_is_followed_from_its_first_row_to_its_last(robot: str) -> N
         assert X.homogeneous == pytest.approx(wanted, abs=1e-8)
 
 
-def test_between_two_rows_the_target_moves_at_constant_speed() -> None:
+def test_joined_by_screws_the_target_moves_at_constant_speed_between_two_rows() -> None:
     """And rests where two rows are the same."""
-    reference = make_scenario(f"csv[file={TRIANGLE}]").reference
+    reference = make_scenario(f"csv[file={TRIANGLE},joined=screw]").reference
     first = reference.velocity(0.1)
     assert reference.velocity(0.9) == pytest.approx(first)
     assert pin.log6(reference.placement(0.0).actInv(reference.placement(1.0))).np == pytest.approx(
         first
     )
     assert np.abs(reference.velocity(2.2)).max() < 1e-12
+
+
+def _weld(path: Path, period: float, origin: str = "0") -> str:
+    """Write a weave across a line, of 1 s, as a UR10 does it, and return its selector."""
+    arm = load_robot("ur10")
+    start, lines = placement_of(arm, arm.q0), [HEADER]
+    for k in range(round(1 / period) + 1):
+        t, w = k * period, 3 * np.pi
+        X = start * pin.SE3(
+            pin.exp3(np.array([0.1 * np.sin(w * t / 2), 0.0, 0.2 * np.sin(w * t / 3)])),
+            np.array([0.06 * t, 0.02 * np.sin(w * t), 0.01 * np.cos(w * t)]),
+        )
+        numbers = [*X.translation, *pin.Quaternion(X.rotation).coeffs()]
+        stamp = Decimal(origin) + k * Decimal(str(period))
+        lines.append(",".join([f"{stamp:f}", *(f"{number:.9f}" for number in numbers)]))
+    path.write_text("\n".join(lines), encoding="utf-8")
+    return f"csv[robot=ur10,file={path},acceleration=true,dt=0.002]"
+
+
+def _claims(scenario: Scenario) -> dict[str, tuple[int, float]]:
+    """What a certificate says: by quantity, the line of the file and the value."""
+    said = [re.match(r"(.*), at line (\d+)(.*)", c.quantity) for c in scenario.certificate.claims]
+    values = [claim.value for claim in scenario.certificate.claims]
+    return {
+        found[1] + found[3]: (int(found[2]), value)
+        for found, value in zip(said, values, strict=True)
+        if found
+    }
+
+
+def test_a_path_is_the_same_task_however_often_it_is_sampled(tmp_path: Path) -> None:
+    """Every 20 ms or every 2 ms: the same accelerations and infeasible steps, the same verdict."""
+    asked, shares = [], []
+    for period in (0.02, 0.002):
+        scenario = make_scenario(_weld(tmp_path / f"{period}.csv", period))
+        assert scenario.feasible == "time"
+        asked.append(_claims(scenario)["required joint acceleration over limit"][1])
+        shares.append(metrics_of("lp-alpha", scenario)["feasible_share"])
+    assert asked[0] == pytest.approx(asked[1], rel=0.03)
+    assert shares[0] == pytest.approx(shares[1], abs=0.005)
+
+
+def test_metrics_are_the_same_whatever_clock_stamped_the_rows(tmp_path: Path) -> None:
+    """From 0, and from the seconds of 2023: every metric to 1e-7 of itself."""
+    first, second = (
+        metrics_of("pinv", make_scenario(_weld(tmp_path / "weld.csv", 0.02, origin)))
+        for origin in ("0", "1700000000.123456789")
+    )
+    for name, value in first.items():
+        assert second[name] == pytest.approx(value, rel=1e-7, nan_ok=True), name
+
+
+def test_the_certificate_says_what_a_file_asks_for_and_at_which_line(tmp_path: Path) -> None:
+    """A jump of 0.1 m in 20 ms, from line 25 to line 26, whatever joins the rows."""
+    path = tmp_path / "jump.csv"
+    rows = [f"{k / 50},{0.3 + 0.1 * (k >= 24)},0,0.5,1,0,0,0" for k in range(50)]
+    path.write_text("\n".join([HEADER, *rows]), encoding="utf-8")
+    for joined in ("smooth", "screw"):
+        scenario = make_scenario(f"csv[file={path},joined={joined}]")
+        said = _claims(scenario)
+        assert said["fastest target between two rows [m/s]"] == (26, pytest.approx(5.0))
+        line, ratio = said["required joint speed over limit"]
+        assert (line, ratio > 2) == (26, True)
+        line, ratio = said["required joint acceleration over limit"]
+        assert (line in (25, 26, 27), ratio > 10) == (True, True)
+        assert scenario.feasible == "path"
+    said = _claims(make_scenario(f"csv[file={path},joined=hold]"))
+    assert said["largest step of the target [m]"] == (26, pytest.approx(0.1))
+
+
+def test_rows_nanoseconds_apart_are_refused_unless_they_are_held() -> None:
+    """13 mm in 1 ns: no target moves so; as a stream it is a step."""
+    file = DATA / "poses" / "tiny_dt.csv"
+    for joined in ("smooth", "screw"):
+        error = scenario_error(f"csv[robot=ur10,file={file},joined={joined}]")
+        assert f"{file}, line 12: the target moves 0.0126 m within 1e-09 s" in error
+        assert "valid: up to 100 m/s, or joined=hold" in error
+    scenario = make_scenario(f"csv[robot=ur10,file={file},joined=hold]")
+    assert _claims(scenario)["largest step of the target [m]"][1] == pytest.approx(0.0126, abs=1e-4)
+    assert metrics_of("dls", scenario)["position_error_max_m"] < 0.05
+
+
+def test_times_in_nanoseconds_are_refused() -> None:
+    """With the unit that is expected."""
+    error = scenario_error(f"csv[robot=ur10,file={DATA / 'poses' / 'nanosec.csv'}]")
+    assert "nanosec.csv, with t in seconds: a run of 4e+09 s" in error
+
+
+def test_an_arm_of_five_joints_is_told_that_a_pose_has_six_rows() -> None:
+    """Its own recorded poses: between the rows no posture of it has the orientation."""
+    error = scenario_error(
+        f"csv[robot={DATA / 'five_dof.urdf'},frame=tool,"
+        f"file={DATA / 'poses' / 'five_dof_own_101.csv'}]"
+    )
+    assert "line 3: the pose or the path to it is out of reach of robot five_dof" in error
+    assert "its frame tool is moved by 5 joints, a pose has 6 rows" in error
+
+
+def test_a_held_target_steps_from_row_to_row() -> None:
+    """Without a velocity, each until the time of the next one."""
+    scenario = make_scenario(f"csv[file={TRIANGLE},joined=hold]")
+    X = scenario.reference.placement
+    assert X(0.999).translation == pytest.approx([0.31, 0.0, 0.49])
+    assert X(1.0).translation == pytest.approx([0.41, -0.1, 0.49])
+    assert not any(np.any(V.np) for _, V in scenario.targets)
+
+
+def test_the_start_is_near_the_posture_that_is_asked_for(tmp_path: Path) -> None:
+    """The elbow below the shoulder, on the same first pose, to the digits of the file."""
+    file, arm = tmp_path / "weld.csv", load_robot("ur10")
+    selector = _weld(file, 0.02)
+    other = np.array([0.3, 0.1, -1.4, -1.7, -1.4, 0.2])
+    above = make_scenario(selector)
+    below = make_scenario(f"{selector[:-1]},q0={' '.join(map(str, other))}]")
+    assert above.q0 == pytest.approx(solve_placement(arm, above.reference.placement(0), arm.q0))
+    assert above.q0[2] > 0.5
+    assert below.q0[2] < -0.5
+    kinematics = Kinematics(arm)
+    kinematics.update(below.q0)
+    X = kinematics.placement(arm.frame_id)
+    assert X.homogeneous == pytest.approx(above.reference.placement(0).homogeneous, abs=1e-8)
 
 
 def test_a_robot_from_a_urdf_file_does_it_too() -> None:
@@ -124,6 +250,9 @@ def test_a_start_outside_the_limits_is_refused(monkeypatch: pytest.MonkeyPatch) 
         ("csv", "parameter 'file' must be given"),
         ("csv[file=nowhere.csv]", "pose file not found: nowhere.csv"),
         (f"csv[file={TRIANGLE},robot=arm.urdf]", "robot file not found: arm.urdf"),
+        (f"csv[file={TRIANGLE},q0=1 2]", "q0: expected shape (7,), got (2,)"),
+        (f"csv[file={TRIANGLE},q0=a b]", "q0: expected 7 numbers, got ['a', 'b']"),
+        (f"csv[file={TRIANGLE},joined=linear]", "valid: smooth, screw, hold"),
         (f"csv[file={TRIANGLE},frame=hand]", "unknown frame 'hand'"),
         (f"csv[file={TRIANGLE},dt=0.00001]", "valid: 1 to 100000"),
     ],
