@@ -8,28 +8,39 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 from types import MappingProxyType
-from typing import Any, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 import pinocchio as pin
 
 from dikbench.errors import DikbenchError
-from dikbench.problem import Array, Robot
+from dikbench.problem import (
+    Array,
+    CollisionConstraint,
+    Range,
+    Robot,
+    TorqueConstraint,
+)
 from dikbench.scenario import (
     Case,
     Claim,
+    Constraint,
     Family,
     OracleMotion,
     Perturbation,
     Reference,
     Variation,
+    effort_limits,
     held,
+    influence_distance,
     measure_motion,
+    read_obstacles,
     read_poses,
     samples,
     solve_placement,
     spline_through,
     through,
+    with_payload,
 )
 
 Joined = Literal["smooth", "screw", "hold"]
@@ -64,8 +75,13 @@ class CsvPoses(Family):
     from the robot's own start, or from `q0`. The certificate says what the file asks for, and at
     which line most: the speed of the target, joint speeds over their limits, and joint
     accelerations where limits are known, from one control step to the next; it claims that every
-    pose can be reached and that the start is inside the limits. A seed changes the pace by up to
-    10 %.
+    pose can be reached and that the start is inside the limits.
+
+    Obstacles are those of a TOML file with tables [[sphere]] (centre, radius), [[capsule]] (start,
+    end, radius) and [[box]] (centre, size, rotation), in metres in the world; the start is claimed
+    to keep the margin from them, the exact motion may run into them. A payload is a ball of 5 cm
+    radius in the hand; with one, effort limits and torque constraints are in force. A seed changes
+    the pace by up to 10 %.
 
     Provokes: what its file does
 
@@ -75,6 +91,9 @@ class CsvPoses(Family):
         file: path of the CSV file.
         joined: what the target does between two rows.
         q0: posture near which the start is looked for, numbers with spaces between them [rad or m].
+        obstacles: path of a TOML file of obstacles.
+        margin: distance to keep from them.
+        payload: mass of what is carried; 0 for nothing, without torque limits.
 
     Source: splines: de Boor 1978; the rest is the file's.
     """
@@ -82,6 +101,9 @@ class CsvPoses(Family):
     file: str
     joined: Joined = "smooth"
     q0: str | None = None
+    obstacles: str | None = None
+    margin: Annotated[float, Range(0.0, 0.05, "m")] = 0.01
+    payload: Annotated[float, Range(0.0, unit="kg")] = 0.0
 
     robots = ("panda",)
     variation = Variation(timing=0.1)
@@ -98,8 +120,29 @@ class CsvPoses(Family):
         reference = JOINTS[self.joined](rows.times, rows.placements)
         motion = measure_motion(robot, instants, _followed(robot, reference, instants, near, rows))
         start = Claim("position margin at the start [rad]", motion.margin[0], at_least=0.0)
-        claims = (*asked, *_asked_of_joints(robot, motion, rows), start)
-        return Case(reference, motion.q[0], motion, claims)
+        claims = [*asked, *_asked_of_joints(robot, motion, rows), start]
+        constraints: list[Constraint] = []
+        if self.obstacles is not None:
+            collision = CollisionConstraint(
+                read_obstacles(self.obstacles),
+                self_collision=False,
+                margin=self.margin,
+                influence=influence_distance(acceleration=self.acceleration),
+            )
+            constraints.append(collision)
+            claims += _distances(robot, motion, rows, collision)
+        if self.payload > 0:
+            robot = with_payload(robot.with_limits(effort=robot.available_effort), self.payload)
+            constraints.append(TorqueConstraint())
+            claims.append(_torque(robot, motion, rows))
+        return Case(
+            reference,
+            motion.q[0],
+            motion,
+            tuple(claims),
+            robot=robot,
+            constraints=tuple(constraints),
+        )
 
 
 class _Rows:
@@ -206,3 +249,25 @@ def _asked_of_joints(arm: Robot, motion: OracleMotion, rows: _Rows) -> tuple[Cla
         for what, (times, values) in shares.items()
         for k in [int(values.argmax())]
     )
+
+
+def _distances(
+    arm: Robot, motion: OracleMotion, rows: _Rows, constraint: CollisionConstraint
+) -> tuple[Claim, Claim]:
+    """Claim that the start is clear; say how near the exact motion comes to an obstacle."""
+    distances = constraint.distances(arm, motion.q)
+    nearest = int(distances.argmin())
+    line = rows.lines[rows.towards(motion.instants[nearest])]
+    return (
+        Claim("distance from obstacles at the start [m]", distances[0], constraint.margin),
+        Claim(f"least distance of the exact motion, at line {line} [m]", distances[nearest]),
+    )
+
+
+def _torque(arm: Robot, motion: OracleMotion, rows: _Rows) -> Claim:
+    """Say what torques the exact motion takes at its inner samples."""
+    limit, v, period = effort_limits(arm), motion.v, float(motion.instants[1])
+    torques = TorqueConstraint().torques(arm, motion.q[1:-1], v[1:], v[:-1], period)
+    usage = limit.usage(torques).max(axis=1)
+    line = rows.lines[rows.towards(motion.instants[1 + int(usage.argmax())])]
+    return Claim(f"required torque over limit, at line {line}", float(usage.max()))

@@ -53,6 +53,7 @@ from dikbench.scenario.building import (
 )
 from dikbench.scenario.certificate import Certificate, Claim
 from dikbench.scenario.family import Case, Family, Gain, Time
+from dikbench.scenario.obstacle_file import read_obstacles
 from dikbench.scenario.oracle import (
     OracleMotion,
     joint_oracle,
@@ -141,6 +142,7 @@ __all__ = [
     "oracle_motion",
     "placement_of",
     "plane_of",
+    "read_obstacles",
     "read_poses",
     "samples",
     "screw_path",

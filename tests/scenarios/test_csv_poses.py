@@ -118,14 +118,15 @@ def test_the_certificate_says_what_a_file_asks_for_and_at_which_line(tmp_path: P
     for joined in ("smooth", "screw"):
         scenario = make_scenario(f"csv[file={path},joined={joined}]")
         said = _claims(scenario)
-        assert said["fastest target between two rows [m/s]"] == (26, pytest.approx(5.0))
+        line, speed = said["fastest target between two rows [m/s]"]
+        assert (line, speed) == pytest.approx((26, 5.0))
         line, ratio = said["required joint speed over limit"]
         assert (line, ratio > 2) == (26, True)
         line, ratio = said["required joint acceleration over limit"]
         assert (line in (25, 26, 27), ratio > 10) == (True, True)
         assert scenario.feasible == "path"
     said = _claims(make_scenario(f"csv[file={path},joined=hold]"))
-    assert said["largest step of the target [m]"] == (26, pytest.approx(0.1))
+    assert said["largest step of the target [m]"] == pytest.approx((26, 0.1))
 
 
 def test_rows_nanoseconds_apart_are_refused_unless_they_are_held() -> None:
@@ -179,6 +180,33 @@ def test_the_start_is_near_the_posture_that_is_asked_for(tmp_path: Path) -> None
     kinematics.update(below.q0)
     X = kinematics.placement(arm.frame_id)
     assert X.homogeneous == pytest.approx(above.reference.placement(0).homogeneous, abs=1e-8)
+
+
+def test_own_obstacles_are_kept_clear_of_on_the_way(tmp_path: Path) -> None:
+    """A ball across the line: `qp` goes round, `dls` runs into it as the certificate says."""
+    obstacles = tmp_path / "obstacles.toml"
+    obstacles.write_text("[[sphere]]\ncentre = [0.41, 0.0, 0.47]\nradius = 0.05\n")
+    scenario = make_scenario(f"csv[file={TRIANGLE},obstacles={obstacles},margin=0.02]")
+    line, depth = _claims(scenario)["least distance of the exact motion [m]"]
+    assert (line, depth < -0.02) == (4, True)
+    blind, seeing = (metrics_of(law, scenario) for law in ("dls", "qp"))
+    assert blind["distance_min_m"] == pytest.approx(depth, abs=5e-3)
+    assert seeing["distance_min_m"] > 0.02 - 1e-3
+    assert seeing["position_error_final_m"] < 1e-3
+    obstacles.write_text("[[sphere]]\ncentre = [0.31, 0.0, 0.49]\nradius = 0.05\n")
+    error = scenario_error(f"csv[file={TRIANGLE},obstacles={obstacles}]")
+    assert "distance from obstacles at the start [m] = -0.05002, must be >= 0.01" in error
+
+
+def test_a_payload_puts_torque_limits_in_force() -> None:
+    """The torques of the exact motion grow with it, and formulations are held to the limits."""
+    plain = make_scenario(f"csv[file={TRIANGLE}]")
+    light, heavy = (make_scenario(f"csv[file={TRIANGLE},payload={mass}]") for mass in (1, 12))
+    assert not plain.limits_torques
+    assert plain.robot.limits.effort is None
+    usage = [_claims(each)["required torque over limit"][1] for each in (light, heavy)]
+    assert usage[0] < 0.5 < 1.0 < usage[1]
+    assert 0.9 * usage[0] < metrics_of("qp", light)["torque_usage_max"] < 1.0
 
 
 def test_a_robot_from_a_urdf_file_does_it_too() -> None:
