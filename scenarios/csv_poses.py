@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
+from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Final, Literal
 
@@ -51,6 +52,11 @@ JOINTS: Final[Mapping[Joined, Callable[[Sequence[float], Sequence[Any]], Referen
     )
 )
 
+STREAMS: Final[Mapping[str, str]] = MappingProxyType(
+    {"teleoperation": str(Path(__file__).parent / "streams" / "teleoperation.csv")}
+)
+"""Files that come with dikbench."""
+
 MOST_SAMPLES: Final = 2000
 """The exact motion is computed at every control step, or so many of them."""
 
@@ -88,7 +94,8 @@ class CsvPoses(Family):
     Shows in: position_error_rms_m, velocity_peak_ratio, position_violation_max_rad, freeze_events
 
     Attributes:
-        file: path of the CSV file.
+        file: path of the CSV file; or `teleoperation`, a stream of 30 Hz with jitter, bursts and
+            gaps that comes with dikbench (made up, by `streams/make_teleoperation.py`).
         joined: what the target does between two rows.
         q0: posture near which the start is looked for, numbers with spaces between them [rad or m].
         obstacles: path of a TOML file of obstacles.
@@ -110,11 +117,11 @@ class CsvPoses(Family):
 
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """See `Family`."""
-        rows = _Rows(self.file, change.pace)
+        rows = _Rows(STREAMS.get(self.file, self.file), change.pace)
         try:
             instants = samples(rows.times[-1], self.dt, MOST_SAMPLES)
         except DikbenchError as error:
-            raise DikbenchError(f"pose file {self.file}, with t in seconds: {error}") from None
+            raise DikbenchError(f"pose file {rows.file}, with t in seconds: {error}") from None
         near = robot.q0 if self.q0 is None else robot.configuration(self.q0.split(), "q0")
         asked = rows.steps() if self.joined == "hold" else rows.speeds()
         reference = JOINTS[self.joined](rows.times, rows.placements)

@@ -11,13 +11,18 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from makers.problems import with_upper_limit
-from makers.scenarios import metrics_of, put_robot, scenario_error
+from makers.scenarios import Recording, metrics_of, put_robot, scenario_error
 
 from dikbench.errors import DikbenchError
+from dikbench.metrics import evaluate, motion_of
 from dikbench.plugins.building import make_scenario
 from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
-from dikbench.scenario import Scenario, placement_of, solve_placement
+from dikbench.scenario import Scenario, placement_of, read_poses, solve_placement
+from dikbench.scenario.plant import Ideal
+from dikbench.simulation.closed_loop import simulate
+from dikbench.solvers.checked_solve import make_solve
+from scenarios.streams import make_teleoperation
 
 DATA = Path(__file__).parents[1] / "data"
 TRIANGLE = DATA / "triangle.csv"
@@ -180,6 +185,37 @@ def test_the_start_is_near_the_posture_that_is_asked_for(tmp_path: Path) -> None
     kinematics.update(below.q0)
     X = kinematics.placement(arm.frame_id)
     assert X.homogeneous == pytest.approx(above.reference.placement(0).homogeneous, abs=1e-8)
+
+
+def test_the_shipped_stream_is_what_its_generator_writes() -> None:
+    """With the jitter, bursts and gaps that it says."""
+    written = make_teleoperation.FILE.read_text(encoding="utf-8")
+    assert written.splitlines() == make_teleoperation.lines()
+    spans = np.diff(read_poses(str(make_teleoperation.FILE)).times)
+    assert np.median(spans) == pytest.approx(1 / 30, abs=1e-3)
+    assert spans.min() < 1e-3
+    assert (spans > 0.25).sum() == 2
+
+
+@pytest.mark.parametrize("joined", ["smooth", "hold"])
+def test_a_stream_is_followed_as_it_is(joined: str) -> None:
+    """By `qp` within its limits, without a freeze; held, the target waits in the gaps."""
+    scenario = make_scenario(f"csv[file=teleoperation,joined={joined},gain=20]")
+    got = metrics_of("qp", scenario)
+    assert got["freeze_events"] == 0
+    assert got["violating_share"] == 0
+    assert got["position_error_final_m"] < 2e-3
+    steps = np.linalg.norm(np.diff(scenario.target_arrays[1], axis=0), axis=1)
+    assert (steps == 0).mean() > 0.5 if joined == "hold" else steps[:-60].min() > 0
+
+
+def test_a_robot_that_gives_no_answer_freezes_before_a_stream() -> None:
+    """Once for all of it, since it never moves again."""
+    scenario = make_scenario("csv[file=teleoperation,joined=hold]")
+    run = simulate(
+        scenario, Recording(lambda problem: np.zeros(7)), make_solve(None, None), Ideal(), "time"
+    )
+    assert evaluate(motion_of(run.trace, scenario))["freeze_events"] == 1
 
 
 def test_own_obstacles_are_kept_clear_of_on_the_way(tmp_path: Path) -> None:
