@@ -24,6 +24,9 @@ are no steeper passes neither of them (Fritsch & Carlson 1980)."""
 ALIKE: Final = 0.5
 """Accelerations that are within this share of their mean are those of one smooth motion."""
 
+NEGLIGIBLE_SPEED: Final = 1e-12
+"""Rounding of speeds [m/s or rad/s]."""
+
 LEVER_M: Final = 0.2
 """Weighs rotations against translations."""
 
@@ -36,9 +39,9 @@ def spline_through(times: Sequence[float], placements: Sequence[Any]) -> Referen
     s and r are cubics in u, in the axes of the world; their derivatives at the rows are velocities
     that make the acceleration continuous (the angular one up to the square of the angle between
     rows), and the third derivative next to either end (de Boor 1978). Where rows are too few for
-    what happens between them, these velocities are reduced, so that the path does not run past a
-    row and back: next to a jump, or to two rows that are close in time, the velocity is continuous
-    and the acceleration is not. Two rows of one placement are a rest, unless they stand on either
+    what happens between them, the velocities are smaller, so that the path does not run past a row
+    and back: next to a jump, or to two rows that are close in time, the velocity is continuous and
+    the acceleration is not. Two rows of one placement are a rest, unless they stand on either
     side of a turning point.
 
     Args:
@@ -103,19 +106,49 @@ def _accelerations(spans: Array, d: Array) -> Array:
 def _velocities(spans: Array, d: Array, charts: Array, rest: Mask) -> Array:
     """Compute the velocities at the rows, (n, 3) [m/s or rad/s].
 
+    Those of a spline; but rows at which it is too fast, the worst of them first, have the smaller
+    of the mean velocities on either side, and the spline begins anew there.
+
+    Args:
+        spans: h_k, (n - 1, 1) [s].
+        d: mean velocities of the segments, (n - 1, 3).
+        charts: see `_spline_velocities`.
+        rest: rows where the velocity is 0, (n,).
+    """
+    most = _fastest(spans, d)
+    most = np.minimum(np.append(most, np.inf), np.insert(most, 0, np.inf))
+    sizes = np.linalg.norm(d, axis=1)
+    smaller = np.where((sizes[:-1] < sizes[1:])[:, None], d[:-1], d[1:])
+    turning = np.einsum("ij,ij->i", d[:-1], d[1:]) <= 0
+    slow = np.vstack([d[:1], np.where(turning[:, None], 0.0, smaller), d[-1:]])
+    given = np.where(rest[:, None], np.zeros(3), np.nan)
+    while True:
+        v = _spline_velocities(spans, d, charts, given)
+        over = np.linalg.norm(v, axis=1) / (most + NEGLIGIBLE_SPEED)
+        over[~np.isnan(given[:, 0])] = 0.0
+        beside = np.maximum(np.append(over[1:], 0.0), np.insert(over[:-1], 0, 0.0))
+        worst = (over > 1) & (over >= beside / 2)
+        if not worst.any():
+            return v
+        given[worst] = slow[worst]
+
+
+def _spline_velocities(spans: Array, d: Array, charts: Array, given: Array) -> Array:
+    """Compute velocities that make the acceleration continuous, (n, 3).
+
         a_k A_k-1 v_k-1 + 2 v_k + b_k B_k v_k+1 = 3 (a_k d_k-1 + b_k d_k),
         a_k = h_k / (h_k-1 + h_k),   b_k = 1 - a_k
 
     at the inner rows.
 
     Args:
-        spans: h_k, (n - 1, 1) [s].
-        d: mean velocities of the segments, (n - 1, 3).
+        spans: see `_velocities`.
+        d: see there.
         charts: B_k, which takes the velocity at the end of a segment to the chart about its
             beginning, and A_k, which does the reverse, (n - 1, 2, 3, 3).
-        rest: rows where the velocity is 0, (n,).
+        given: velocities at single rows, NaN at the others, (n, 3).
     """
-    n, one = len(d) + 1, np.eye(3)
+    n, one, fixed = len(d) + 1, np.eye(3), ~np.isnan(given[:, 0])
     before, own, after = np.zeros((3, n, 3, 3))
     right = np.empty((n, 3))
     B, A = charts[:, 0], charts[:, 1]
@@ -124,21 +157,16 @@ def _velocities(spans: Array, d: Array, charts: Array, rest: Mask) -> Array:
     before[1:-1], own[1:-1], after[1:-1] = a[:, None] * A[:-1], 2 * one, b[:, None] * B[1:]
     right[1:-1] = 3 * (a * d[:-1] + b * d[1:])
     for end, inner, beside, chart, shares in ((0, 1, after, A, a), (-1, -2, before, B, b)):
-        if n == 2 or rest[inner]:  # a segment by itself: constant velocity
+        if n == 2 or fixed[inner]:  # a segment by itself: constant velocity
             own[end], right[end] = one, d[end]
-        elif n == 3 or rest[2 * inner - end]:  # two segments: a parabola
+        elif n == 3 or fixed[2 * inner - end]:  # two segments: a parabola
             own[end], beside[end], right[end] = chart[end], one, 2 * d[end]
         else:
             share = float(shares[end, 0])
             own[end], beside[end] = share * chart[end], one
             right[end] = (3 - share) * share * d[end] + (1 - share) ** 2 * d[inner]
-    before[rest], own[rest], after[rest], right[rest] = 0.0, one, 0.0, 0.0
-    v = _solved(before, own, after, right)
-    most = _fastest(spans, d)
-    most = np.minimum(np.append(most, np.inf), np.insert(most, 0, np.inf))
-    speeds = np.linalg.norm(v, axis=1)
-    slower: Array = v * np.minimum(1.0, most / np.where(speeds > 0, speeds, 1.0))[:, None]
-    return slower
+    before[fixed], own[fixed], after[fixed], right[fixed] = 0.0, one, 0.0, given[fixed]
+    return _solved(before, own, after, right)
 
 
 def _fastest(spans: Array, d: Array) -> Array:

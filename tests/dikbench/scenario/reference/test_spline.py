@@ -156,8 +156,6 @@ def test_next_to_a_jump_the_path_does_not_run_past_its_rows(first: int, gap: flo
         times, [pin.SE3(np.eye(3), np.array([each, 0.0, 0.0])) for each in x]
     )
     at = [reference.placement(tau).translation[0] for tau in np.linspace(0, times[-1], 2001)]
-    assert np.diff(at).min() >= -1e-4
-    assert min(at) >= -1e-4
-    assert max(at) <= max(x) + 1e-4
+    assert np.diff(at).min() >= -1e-12
     for row in {first - 1, first} - {0, 19}:
         assert np.abs(reference.velocity(times[row])).max() < 0.05
