@@ -77,11 +77,11 @@ class CsvPoses(Family):
     from the first row. The rows are joined `smooth` (cubic splines of position and orientation; two
     rows of one pose are a rest), by the `screw` from each to the next at constant speed, whose
     jumps no robot follows exactly, or each is on `hold` until the time of the next, without a
-    velocity, as a stream of commands is (which does not wait: the reference mode is `time`). The run starts on the first pose, in the posture found
-    from the robot's own start, or from `q0`. The certificate says what the file asks for, and at
-    which line most: the speed of the target, joint speeds over their limits, and joint
-    accelerations where limits are known, from one control step to the next; it claims that every
-    pose can be reached and that the start is inside the limits.
+    velocity, as a stream of commands is (which does not wait: the reference mode is `time`). The
+    run starts on the first pose, in the posture found from the robot's own start, or from `q0`. The
+    certificate says what the file asks for, and at which line most: the speed of the target, joint
+    speeds over their limits, and joint accelerations where limits are known, from one control step
+    to the next; it claims that every pose can be reached and that the start is inside the limits.
 
     Obstacles are those of a TOML file with tables [[sphere]] (centre, radius), [[capsule]] (start,
     end, radius) and [[box]] (centre, size, rotation), in metres in the world; the start is claimed
