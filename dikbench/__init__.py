@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     )
     from dikbench.programs.quadratic_program import QuadraticProgram
     from dikbench.results.reading import Results, load_results
-    from dikbench.robots.catalogue import load_robot
     from dikbench.robots.collision.obstacles import BoxObstacle, CapsuleObstacle, SphereObstacle
+    from dikbench.robots.loading import load_robot
     from dikbench.robots.robot import Robot
     from dikbench.scenario.scenario import Scenario
     from dikbench.simulation.one_step import DikAnswer, solve_dik
@@ -54,7 +54,7 @@ _HOME: Final = {
     ),
     "programs.quadratic_program": ("QuadraticProgram",),
     "results.reading": ("Results", "load_results"),
-    "robots.catalogue": ("load_robot",),
+    "robots.loading": ("load_robot",),
     "robots.collision.obstacles": ("BoxObstacle", "CapsuleObstacle", "SphereObstacle"),
     "robots.robot": ("Robot",),
     "cli.running": ("run_study",),

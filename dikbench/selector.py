@@ -1,7 +1,7 @@
 """Selectors: `name`, `name[parameter=value,...]` or `path/to/file.py:Class[...]`.
 
 Where a study or the command line selects, a value may be a list, `value|value`; several lists make
-a product.
+a product. A name or a value with one of the characters `,|[]` in it stands in quotes.
 """
 
 from __future__ import annotations
@@ -14,7 +14,10 @@ from types import MappingProxyType
 
 from dikbench.errors import DikbenchError
 
+_QUOTED = re.compile(r"""'[^']*'|"[^"]*\"""")
 _FORM = re.compile(r"(?P<name>[^\[\]\s][^\[\]]*?)(\[(?P<parameters>[^\[\]]*)\])?")
+_NAME_NEEDS_QUOTES = re.compile(r"""[\[\]'"]|^\s|\s$""")
+_VALUE_NEEDS_QUOTES = re.compile(r"""[,|\[\]'"]|^\s|\s$""")
 
 
 @dataclass(frozen=True)
@@ -45,7 +48,8 @@ class Selector:
 
     def __str__(self) -> str:
         """Write the selector as text, which `parse_selector` reads: `name[parameter=value,...]`."""
-        return f"{self.name}[{listed(self.parameters)}]" if self.parameters else self.name
+        name = quoted(self.name, _NAME_NEEDS_QUOTES)
+        return f"{name}[{listed(self.parameters)}]" if self.parameters else name
 
     def ordered(self, names: Iterable[str]) -> Selector:
         """Return the same selector, its parameters in the order of `names`, others last."""
@@ -55,7 +59,14 @@ class Selector:
 
 def listed(parameters: Mapping[str, object]) -> str:
     """Write parameters as they stand in the brackets of a selector."""
-    return ",".join(f"{name}={value}" for name, value in parameters.items())
+    return ",".join(f"{name}={quoted(str(value))}" for name, value in parameters.items())
+
+
+def quoted(text: str, where: re.Pattern[str] = _VALUE_NEEDS_QUOTES) -> str:
+    """Put a text in quotes where a selector needs them."""
+    if not where.search(text):
+        return text
+    return f"'{text}'" if '"' in text else f'"{text}"'
 
 
 def parse_selector(text: str | Selector) -> Selector:
@@ -66,21 +77,45 @@ def parse_selector(text: str | Selector) -> Selector:
     """
     if isinstance(text, Selector):
         return text
-    match = _FORM.fullmatch(text.strip())
+    name, parameters = _parts(text)
+    return Selector(_unquoted(name), {key: _unquoted(value) for key, value in parameters.items()})
+
+
+def _parts(text: str) -> tuple[str, dict[str, str]]:
+    """Split a selector into its name and its parameters, which keep their quotes."""
+    given, text = text, text.strip()
+    match = _FORM.fullmatch(_without_quoted(text))
     if match is None:
         raise DikbenchError(
-            f"selector {text!r} is not of the form name or name[parameter=value,...]"
+            f"selector {given!r} is not of the form name or name[parameter=value,...]"
         )
     parameters: dict[str, str] = {}
-    inside = match["parameters"]
-    for item in inside.split(",") if inside and inside.strip() else ():
+    inside = text[slice(*match.span("parameters"))] if match["parameters"] else ""
+    for item in _split(inside, ",") if inside.strip() else ():
         key, equals, value = (part.strip() for part in item.partition("="))
-        if not equals or not key or not value:
-            raise DikbenchError(f"selector {text!r}: {item.strip()!r} is not parameter=value")
+        if not equals or not key or not _unquoted(value):
+            raise DikbenchError(f"selector {given!r}: {item.strip()!r} is not parameter=value")
         if key in parameters:
-            raise DikbenchError(f"selector {text!r}: parameter {key!r} is given twice")
+            raise DikbenchError(f"selector {given!r}: parameter {key!r} is given twice")
         parameters[key] = value
-    return Selector(match["name"].strip(), parameters)
+    return text[slice(*match.span("name"))].strip(), parameters
+
+
+def _without_quoted(text: str) -> str:
+    """Replace what is in quotes by as many letters."""
+    return _QUOTED.sub(lambda part: "q" * len(part[0]), text)
+
+
+def _split(text: str, at: str) -> list[str]:
+    """Split a text at a character outside of quotes."""
+    ends = [place.start() for place in re.finditer(re.escape(at), _without_quoted(text))]
+    return [
+        text[a:b] for a, b in zip([0, *(end + 1 for end in ends)], [*ends, len(text)], strict=True)
+    ]
+
+
+def _unquoted(text: str) -> str:
+    return text[1:-1] if _QUOTED.fullmatch(text) else text
 
 
 def alternatives(text: str) -> list[Selector]:
@@ -92,12 +127,15 @@ def alternatives(text: str) -> list[Selector]:
     Raises:
         DikbenchError: if the text is no selector, or a value of a list is missing or given twice.
     """
-    selector = parse_selector(text)
-    lists = [[v.strip() for v in values.split("|")] for values in selector.parameters.values()]
-    for key, values in zip(selector.parameters, lists, strict=True):
+    name, parameters = _parts(text)
+    lists = [
+        [_unquoted(value.strip()) for value in _split(values, "|")]
+        for values in parameters.values()
+    ]
+    for key, values in zip(parameters, lists, strict=True):
         if not all(values) or len(set(values)) < len(values):
             raise DikbenchError(f"selector {text!r}: {key} lists an empty value, or one twice")
     return [
-        Selector(selector.name, dict(zip(selector.parameters, chosen, strict=True)))
+        Selector(_unquoted(name), dict(zip(parameters, chosen, strict=True)))
         for chosen in itertools.product(*lists)
     ]

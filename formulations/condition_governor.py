@@ -78,7 +78,8 @@ class ConditionGovernor(Parameters):
         """Compute the factor c for a velocity (nv,) at a configuration (nq,)."""
         rows, data = list(robot.task_rows), robot.scratch
         pin.computeJointJacobiansTimeVariation(robot.model, data, q, v)
-        local = (robot.model, data, robot.frame_id, pin.LOCAL)
+        axes = pin.LOCAL if robot.task_axes == "body" else pin.LOCAL_WORLD_ALIGNED
+        local = (robot.model, data, robot.frame_id, axes)
         # Pinocchio returns a vector for a single joint.
         J = pin.getFrameJacobian(*local).reshape(6, -1)[rows]
         U, sigma, Vt = thin_svd(J)

@@ -74,6 +74,8 @@ class LpAlphaComponents(Parameters):
         rotation = pin.updateFramePlacement(robot.model, robot.scratch, robot.frame_id).rotation
         rows = _rows(problem, robot.task_rows)
         rates = twist_from_rates(rotation) if rows[-1] >= 3 else rotation.T
+        if robot.task_axes == "world":
+            rates = np.kron(np.eye(len(rates) // 3), rotation) @ rates
         E = rates[np.ix_(rows, rows)]
         P = np.zeros((n + m, n + m))
         P[:n, :n].flat[:: n + 1] = regularization_for(task, self.regularization)

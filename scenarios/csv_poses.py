@@ -134,7 +134,7 @@ class CsvPoses(Family):
                 read_obstacles(self.obstacles),
                 self_collision=False,
                 margin=self.margin,
-                influence=influence_distance(acceleration=self.acceleration),
+                influence=influence_distance(robot),
             )
             constraints.append(collision)
             claims += _distances(robot, motion, rows, collision)
@@ -219,12 +219,10 @@ def _followed(arm: Robot, reference: Reference, instants: Array, near: Array, ro
         try:
             q.append(solve_placement(arm, reference.placement(tau), q[-1]))
         except DikbenchError:
-            joints, asked = len(arm.chain), len(arm.task_rows)
-            few = f"; its frame {arm.frame} is moved by {joints} joints, a pose has {asked} rows"
             line = rows.lines[_out_of_reach(arm, q[-1], rows, rows.towards(tau))]
             raise DikbenchError(
                 f"pose file {rows.file}, line {line}: the pose or the path to it is out of reach "
-                f"of robot {arm.name} (at {tau:.3g} s){few if joints < asked else ''}"
+                f"of robot {arm.name} (at {tau:.3g} s)"
             ) from None
     return np.array(q[1:])
 

@@ -90,7 +90,7 @@ class Humanoid(Family):
         """See `Family`."""
         model = robot.model
         arms = [model.joints[k].idx_v for k, name in enumerate(model.names) if "arm" in name]
-        q0 = change.posture(robot, robot.q0, tuple(k for k in range(robot.nv) if k not in arms))
+        q0 = change.posture(robot, robot.q0, moving=arms)
         feet = _feet(robot, q0, FEET_GAIN_PER_STEP / self.dt)
         tracking = PoseTask(gain=self.gain)
         together = TrackingTogether(tracking, feet)

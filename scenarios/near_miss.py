@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.errors import DikbenchError
-from dikbench.problem import Array, Drawn, Range, Robot
+from dikbench.problem import Array, Drawn, Kinematics, PoseTask, Range, Robot
 from dikbench.scenario import (
     SINGULAR_NEED,
     Case,
@@ -26,10 +26,10 @@ from dikbench.scenario import (
     Variation,
     analyse,
     at_constant_rate,
+    body_twist,
     joint_oracle,
     make_singular,
     oracle_motion,
-    placement_of,
     screw_path,
     singular_postures,
     solve_placement,
@@ -104,11 +104,6 @@ class NearMiss(Family):
 
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """See `Family`."""
-        if robot.nv < len(robot.task_rows):
-            raise DikbenchError(
-                f"robot {robot.name} has {robot.nv} joints, a pose has {len(robot.task_rows)} "
-                "rows: every posture is singular; valid: an arm with as many joints as rows"
-            )
         pace = self.speed / change.pace
         if self.singularity == "auto" and self.robot not in SINGULAR_POSTURES:
             passage = _first_found(robot, self.miss, pace, change)
@@ -220,8 +215,8 @@ def _crossings(
     arm: Robot, where: Singularity, miss: float, speed: float, half_length: float
 ) -> Iterator[tuple[Reference, Array]]:
     """Yield paths along the joint that leads out fastest, on either side, and seeds."""
-    out, twist = _way_out(where), np.zeros(6)
-    twist[list(arm.task_rows)] = where.jacobian @ out
+    out = _way_out(where)
+    twist = body_twist(arm, where.placement, where.jacobian @ out)
     seed = pin.integrate(arm.model, where.q, -half_length * out)
     for side in (1.0, -1.0):
         middle = where.placement * pin.exp6(pin.Motion(side * miss * where.lost))
@@ -290,5 +285,7 @@ def _claims(
 
 
 def _distance_from(where: Singularity, q: Array, arm: Robot) -> float:
-    """Compute the twist's length (m, rad) from the singular placement to that of q."""
-    return float(np.linalg.norm(pin.log6(where.placement.actInv(placement_of(arm, q))).np))
+    """Compute the length (m, rad) of what is asked for, from q to the singular placement."""
+    kinematics = Kinematics(arm)
+    kinematics.update(q)
+    return float(np.linalg.norm(PoseTask().linearize(kinematics, where.placement).error))

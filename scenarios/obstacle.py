@@ -134,7 +134,7 @@ class ObstacleInTheWay(Family):
         half_way = motion.q[len(motion.q) // 2]
         constraint = replace(
             _in_the_way(robot, half_way, swing.joint, self.where, self.shape, self.depth),
-            influence=influence_distance(acceleration=self.acceleration),
+            influence=influence_distance(robot),
         )
         distance, depth = constraint.distances(robot, motion.q), 0.8 * self.depth
         claims = collision_claims(motion, distance, MARGIN_M, depth=depth, speed=self.speed)

@@ -16,6 +16,7 @@ from dikbench.scenario import (
     Perturbation,
     Time,
     Variation,
+    body_twist,
     from_rest_to_rest,
     motion_of_a_step,
     placement_of,
@@ -57,12 +58,12 @@ class Reach(Family):
         """See `Family`."""
         q0 = change.posture(robot, robot.q0)
         axis = change.rotation(robot) @ np.array([-1.0, 1.0, -1.0])
-        twist = np.zeros(6)
-        rows = list(robot.task_rows)
-        twist[rows] = np.concatenate([axis, axis])[rows]  # only what the arm can move
-        twist[:3] *= self.distance / np.linalg.norm(twist[:3])
-        twist[3:] *= self.angle / np.linalg.norm(twist[3:])
-        target = placement_of(robot, q0) * pin.exp6(pin.Motion(twist))
+        start, rows = placement_of(robot, q0), list(robot.task_rows)
+        twist = body_twist(robot, start, np.concatenate([axis, axis])[rows])
+        for part, size in ((twist[:3], self.distance), (twist[3:], self.angle)):
+            if part.any():  # only what is asked for
+                part *= size / np.linalg.norm(part)
+        target = start * pin.exp6(pin.Motion(twist))
         way = motion_of_a_step(robot, q0, twist, self.gain)
         claims = (*step_claims(way), *usual_claims(way, speed=(-np.inf, 0.9)))
         witness = from_rest_to_rest(robot, way, 0.8 * self.duration)

@@ -75,9 +75,7 @@ class SelfCollision(Family):
         duration = duration_at(robot, at_one_second, q0, self.speed) * change.pace
         reference = joint_path(robot, *there_and_back(robot, q0, offset, duration), duration)
         motion = self.exact_motion(robot, reference, q0, most=100)
-        constraint = CollisionConstraint(
-            margin=MARGIN_M, influence=influence_distance(acceleration=self.acceleration)
-        )
+        constraint = CollisionConstraint(margin=MARGIN_M, influence=influence_distance(robot))
         distance = constraint.distances(robot, motion.q)
         claims = collision_claims(motion, distance, MARGIN_M, depth=0.02, speed=self.speed)
         return Case(reference, q0, motion, claims, constraints=(constraint,))

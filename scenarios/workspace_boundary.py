@@ -22,6 +22,7 @@ from dikbench.scenario import (
     Variation,
     measure_motion,
     placement_of,
+    position_margin,
     solve_placement,
     target_at_rest,
 )
@@ -31,6 +32,12 @@ FIRST_STEP_M = 0.02
 
 REACH_RESOLUTION_M = 1e-4
 """Step at which the search for the reach ends."""
+
+POSITION_MARGIN_RAD = 0.02
+"""Smallest distance from a position limit up to the edge of the reach."""
+
+MOST_STEPS = 500
+"""Steps along the line, at most 10 m, after which nothing ends it."""
 
 LARGEST_JOINT_STEP_RAD = 0.6
 """A solution that is farther away belongs to another branch."""
@@ -69,7 +76,7 @@ class WorkspaceBoundary(Family):
         """See `Family`."""
         q0 = change.posture(robot, robot.q0)
         start = placement_of(robot, q0)
-        origin = robot.model.jointPlacements[1].translation
+        origin = robot.shoulder
         ray = start.translation - origin
         first = float(np.linalg.norm(ray))
         ray /= first
@@ -95,7 +102,11 @@ class WorkspaceBoundary(Family):
             Claim("farthest target over the reach", asked / reach, at_least=1 - 1e-9),
             Claim("singular value at the boundary (m, rad)", sigma[-1], at_most=0.02),
             Claim("its ratio to the one at the start", sigma[-1] / sigma[0], at_most=0.1),
-            Claim("position margin up to there [rad]", motion.margin.min(), at_least=0.02),
+            Claim(
+                "position margin up to there [rad]",
+                motion.margin.min(),
+                at_least=POSITION_MARGIN_RAD,
+            ),
         )
         return Case(
             reference,
@@ -111,7 +122,11 @@ class WorkspaceBoundary(Family):
 def _as_far_as_it_goes(
     arm: Robot, at: Callable[[float], Any], first: float, q0: Array
 ) -> OracleMotion:
-    """Follow the placements at(distance) from `first` [m] on until none is reached."""
+    """Follow the placements at(distance) from `first` [m] on until none is reached.
+
+    Raises:
+        DikbenchError: if the line leaves a limit first, or nothing ends it.
+    """
     q, distance, stride = [q0], first, FIRST_STEP_M
     while stride > REACH_RESOLUTION_M:
         try:
@@ -124,6 +139,16 @@ def _as_far_as_it_goes(
             continue
         q.append(further)
         distance += stride
+        if position_margin(arm, further) < POSITION_MARGIN_RAD:
+            raise DikbenchError(
+                f"along the line from its start robot {arm.name} meets a joint limit at "
+                f"{distance:.3g} m, not the edge of its reach"
+            )
+        if len(q) > MOST_STEPS:
+            raise DikbenchError(
+                f"nothing ends the reach of robot {arm.name} along the line from its start: it "
+                f"still follows at {distance:.3g} m"
+            )
     return measure_motion(arm, np.arange(len(q), dtype=float), np.array(q))
 
 

@@ -22,7 +22,8 @@ from dikbench.plugins.finding import (
     scenario_plugin,
 )
 from dikbench.report.tables.every import tables_with
-from dikbench.robots.catalogue import ROBOTS, load_robot
+from dikbench.robots.catalogue import ROBOTS
+from dikbench.robots.loading import load_robot
 from dikbench.scenario.oracle import ORACLE, ORACLES, SLOWED_ORACLE
 from dikbench.scenario.plant import PLANTS
 from dikbench.scenario.scenario import Scenario

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any, Literal, TypeVar
+from typing import Any, Final, Literal, TypeVar
 
 import msgspec
 
 from dikbench.errors import DikbenchError, in_words, unknown
 from dikbench.parameters import Parameter, check_parameters, parameters_of
 from dikbench.plugins.finding import formulation_plugin, scenario_plugin
+from dikbench.plugins.time_limit import time_limit
 from dikbench.problem.problem import Formulation
 from dikbench.scenario.certificate import CertificateFailed
 from dikbench.scenario.family import Family
@@ -19,6 +20,9 @@ from dikbench.scenario.scenario import Scenario
 from dikbench.selector import Selector, parse_selector
 
 Made = TypeVar("Made")
+
+LONGEST_BUILDING_S: Final = 50.0
+"""Processor time after which the building of a scenario ends; a humanoid's takes some seconds."""
 
 
 def make_formulation(text: str | Selector) -> Formulation:
@@ -56,7 +60,8 @@ def make_scenario(text: str | Selector, seed: int = 0) -> Scenario:
     """
     family = make_family(text)
     try:
-        return family.scenario(seed)
+        with time_limit(LONGEST_BUILDING_S, "its building"):
+            return family.scenario(seed)
     except CertificateFailed as error:
         raise CertificateFailed(str(text), error.failures) from None
     except MemoryError:

@@ -30,7 +30,8 @@ class Embedding:
     no second part, one on the orientation no first. Where a task leaves one axis a of the target
     free, the second part is L R a, and d6 has the angle between the two axes R a for theta. Where
     it asks for a turn about one axis only, A and B keep the plane across it. A single linear row is
-    one along an axis of the target at its start.
+    one along an axis of the target at its start. Where the robot's task axes are the world's, a is
+    a world axis, the second part L a^T R, and linear rows are along the world's axes.
 
     Attributes:
         linear: P, (r, 3).
@@ -77,12 +78,17 @@ def embedding_of(
     kept = rows[weights >= NEGLIGIBLE_WEIGHT_SHARE * weights.max()]
     linear, angular = kept[kept < 3], kept[kept >= 3] - 3
     identity, axes = np.eye(3), np.asarray(start)
-    P = identity if len(linear) == 3 else axes.T[linear]
+    world = robot.task_axes == "world"
+    P = identity if len(linear) == 3 else (identity if world else axes.T)[linear]
     if len(angular) == 3:
         return Embedding(P, identity, identity, length / sqrt(2))
     free = np.setdiff1d(np.arange(3), angular)
+    if len(angular) == 2 and world:
+        return Embedding(P, identity[free], identity, length)
     if len(angular) == 2:
         return Embedding(P, identity, identity[:, free], length)
+    if len(angular) == 1 and world:
+        return Embedding(P, identity[free], axes.T[:, free], length / sqrt(2))
     if len(angular) == 1:
         return Embedding(P, axes.T[free], identity[:, free], length / sqrt(2))
     return Embedding(P, identity, identity, 0.0)

@@ -1,27 +1,20 @@
-"""The robots known by name, and robots from a user's URDF."""
+"""The robots known by name."""
 
 from __future__ import annotations
 
-import os.path
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from dataclasses import dataclass
 from math import pi
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from dikbench.arrays import Array
-from dikbench.errors import DikbenchError, unknown
-from dikbench.robots.captured_stderr import captured_stderr
 from dikbench.robots.denavit_hartenberg import denavit_hartenberg_arm
-from dikbench.robots.example_robot_data import DataModel, data_file, joints, urdf_visuals
+from dikbench.robots.example_robot_data import DataModel, joints
 from dikbench.robots.omnidirectional_base import omnidirectional_base
 from dikbench.robots.planar_arm import planar_arm
-from dikbench.robots.robot import Robot, checked_vector, frame_id, model_limits
 
 UR_START = (0.3, -1.2, 1.4, -1.7, -1.4, 0.2)
 NOT_PUBLISHED = "no data sheet or manual gives any"
@@ -216,108 +209,3 @@ ROBOTS: Mapping[str, CatalogueEntry] = MappingProxyType(
         ),
     }
 )
-
-
-def load_robot(name_or_urdf: str, frame: str | None = None, *, start: object = None) -> Robot:
-    """Load a robot by name, or any URDF file together with the name of its task frame.
-
-    Position, velocity and effort limits are the model's; effort and acceleration limits are known
-    but not in force (see `Robot.with_limits`).
-
-    Args:
-        name_or_urdf: a name of `dikbench list robots`, or the path of a URDF file.
-        frame: the task frame; default: the catalogue's. A URDF has no default.
-        start: the safe start, shape (nq,) [rad]; default: the catalogue's, for a URDF the
-            best-conditioned of 64 seeded postures inside the limits.
-
-    Raises:
-        DikbenchError: on an unknown robot or frame, a file that is missing or does not parse, or a
-            start outside the limits.
-    """
-    text = str(name_or_urdf)
-    if text in ROBOTS:
-        robot = _load_named(text)
-    elif text.endswith((".urdf", ".xml")) or "/" in text or os.path.isfile(text):
-        robot = _load_urdf(text, frame)
-    else:
-        raise unknown("robot", text, ROBOTS, "(or give the path of a .urdf file)")
-    if frame is not None and frame != robot.frame:
-        frame_id(robot.model, frame)
-        robot = replace(robot, frame=frame)
-    if start is None:
-        return robot
-    q0 = checked_vector(start, robot.nq, f"start of {text}")
-    limits = robot.limits.at(q0)
-    assert limits.to_lower is not None
-    assert limits.to_upper is not None
-    if np.any(limits.to_lower < 0) or np.any(limits.to_upper < 0):
-        raise DikbenchError(f"start of {text}: {q0.tolist()} is outside the position limits")
-    return replace(robot, q0=q0)
-
-
-@lru_cache
-def _load_named(name: str) -> Robot:
-    entry = ROBOTS[name]
-    model = entry.model()
-    model.name = name
-    limits = model_limits(model).with_interval("effort", None)
-    acceleration = None if entry.acceleration is None else np.array(entry.acceleration, dtype=float)
-    q0 = pin.integrate(model, pin.neutral(model), np.array(entry.start, dtype=float))
-    robot = Robot(name, model, entry.frame, limits, q0, entry.task_rows, acceleration)
-    if not isinstance(entry.model, DataModel):
-        return robot
-    srdf = entry.model.srdf
-    return replace(
-        robot,
-        visuals=entry.model.visuals,
-        urdf=data_file(entry.model.urdf),
-        srdf=None if srdf is None else data_file(srdf),
-    )
-
-
-def _load_urdf(path: str, frame: str | None) -> Robot:
-    if not os.path.isfile(path):  # unlike Path.is_file, False for a name that is too long
-        raise DikbenchError(f"robot file not found: {path}")
-    with captured_stderr() as complaints:
-        try:
-            model = pin.buildModelFromUrdf(path)
-        except (ValueError, RuntimeError) as error:
-            reason = " ".join(f"{error} {complaints()}".split())
-            raise DikbenchError(
-                f"robot file {path} is not a URDF that Pinocchio reads: {reason}"
-            ) from None
-    if model.nv == 0:
-        raise DikbenchError(f"robot file {path}: the model has no moving joint")
-    if frame is None:
-        frames = ", ".join(f.name for f in model.frames if f.name != "universe")
-        raise DikbenchError(f"robot file {path}: name its task frame; valid: {frames}")
-    limits = model_limits(model).with_interval("effort", None)
-    name = Path(path).stem
-    start = _well_conditioned_start(model, frame)
-    visuals = partial(urdf_visuals, model, path, Path(path).absolute().parent)
-    return Robot(name, model, frame, limits, start, visuals=visuals, urdf=path)
-
-
-def _well_conditioned_start(model: Any, frame: str) -> Array:
-    """Choose the posture with the largest smallest singular value among 64 seeded ones."""
-    data, index = model.createData(), frame_id(model, frame)
-    limits = model_limits(model)
-    assert limits.position is not None
-    lower = np.maximum(limits.position.lower, -pi)
-    upper = np.minimum(limits.position.upper, pi)
-    middle, half = (lower + upper) / 2, (upper - lower) / 2
-    neutral = pin.neutral(model)
-    random = np.random.default_rng(0)
-    best, best_sigma = neutral, -1.0
-    for sample in range(64):
-        spread = 0.0 if sample == 0 else 0.6
-        x = middle + spread * half * random.uniform(-1, 1, model.nv)
-        q = pin.integrate(model, neutral, x)
-        q[limits.q_index] = np.where(np.isfinite(limits.position.upper), x, q[limits.q_index])
-        J = pin.computeFrameJacobian(model, data, q, index, pin.LOCAL)
-        J = J.reshape(6, model.nv)  # Pinocchio returns a vector for a single joint
-        sigma = np.linalg.svd(J, compute_uv=False)[min(6, model.nv) - 1]
-        if sigma > best_sigma:
-            best, best_sigma = q, float(sigma)
-    start: Array = best
-    return start

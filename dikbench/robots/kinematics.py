@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from dikbench.arrays import Array
+from dikbench.arrays import Array, Indices
 from dikbench.robots.robot import Robot
 
 
@@ -41,12 +42,27 @@ class Kinematics:
         J: Array = pin.getFrameJacobian(self._model, self._data, frame, pin.LOCAL)
         return J if J.ndim == 2 else J[:, None]  # Pinocchio returns a vector for a single joint
 
+    def task_jacobian(self, rows: Sequence[int] | Indices | None = None) -> Array:
+        """Compute rows of the task frame's Jacobian, (m, nv), in the robot's task axes.
+
+        Args:
+            rows: the rows (linear; angular); default: those that the robot is asked for.
+        """
+        robot = self.robot
+        J = self.jacobian(robot.frame_id)
+        if robot.task_axes == "world":
+            R = self.placement(robot.frame_id).rotation
+            J = np.vstack([R @ J[:3], R @ J[3:]])
+        kept: Array = J[np.array(robot.task_rows if rows is None else rows)]
+        return kept
+
     @property
     def spatial_jacobian(self) -> Array:
-        """Twist (linear; angular) of each joint at the world's origin and in its axes, (6, nv).
+        """Twist (linear; angular) of each joint at the world's origin and in its axes, (6, n).
 
         The product of a wrench there and column k is the wrench's power on what joint k moves, per
-        unit of the joint's speed.
+        unit of the joint's speed; n = nv, or more where joints follow others (see
+        `dikbench.robots.mimic.coupling`).
         """
         J: Array = self._data.J
         return J if J.ndim == 2 else J[:, None]

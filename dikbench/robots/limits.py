@@ -100,6 +100,28 @@ class JointLimits:
             )
         return self._replaced(kind, Interval(lower, upper))
 
+    def of_joints(self, kept: Indices, coordinates: Indices) -> JointLimits:
+        """Return the limits of some joints.
+
+        Args:
+            kept: their indices into v.
+            coordinates: the indices into q that are theirs.
+        """
+        renumbered = {int(old): new for new, old in enumerate(coordinates)}
+        q_index = [renumbered[k] if k >= 0 else -1 for k in self.q_index[kept].tolist()]
+
+        def of(interval: Interval | None) -> Interval | None:
+            return interval and Interval(interval.lower[kept], interval.upper[kept])
+
+        return JointLimits(
+            nv=len(kept),
+            q_index=np.array(q_index),
+            position=of(self.position),
+            velocity=of(self.velocity),
+            acceleration=of(self.acceleration),
+            effort=of(self.effort),
+        )
+
     def _replaced(self, kind: str, interval: Interval | None) -> JointLimits:
         changed: dict[str, Any] = {kind: interval}
         return replace(self, **changed)

@@ -8,10 +8,12 @@ from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
+import pinocchio as pin
 
 from dikbench.arrays import Array, Indices
 from dikbench.errors import DikbenchError, unknown
 from dikbench.robots.limits import NO_LIMIT_MAGNITUDE, Interval, JointLimits
+from dikbench.robots.task_rows import ALL_ROWS, Axes
 
 UNCHANGED: Final[Any] = object()
 
@@ -26,8 +28,10 @@ class Robot:
         frame: name of the task frame, in which twists are expressed.
         limits: the limits of the joints that are in force.
         q0: a safe start, shape (nq,): inside the limits, away from singularities.
-        task_rows: the rows of the body twist (linear; angular) that the arm can move: all six in
-            space, (0, 1, 5) for an arm in the x-y plane. Pose tasks are restricted to them.
+        task_rows: the rows of the task frame's twist (linear; angular) that are asked for: all six
+            in space, (0, 1, 5) for an arm in the x-y plane. Pose tasks are restricted to them.
+        movable_rows: the rows of the body twist that the arm can move, whatever is asked for.
+        task_axes: the axes in which these rows are counted, the task frame's or the world's.
         available_acceleration: acceleration limits [rad/s^2] known for this robot, shape (nv,),
             in force only where a scenario or `with_limits` says so; None where none are known.
         visuals: builds its visual geometry (`pinocchio.GeometryModel`); may raise ValueError where
@@ -41,7 +45,9 @@ class Robot:
     frame: str
     limits: JointLimits
     q0: Array
-    task_rows: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
+    task_rows: tuple[int, ...] = ALL_ROWS
+    task_axes: Axes = "body"
+    movable_rows: tuple[int, ...] = ALL_ROWS
     available_acceleration: Array | None = None
     visuals: Callable[[], Any] | None = None
     urdf: str | None = None
@@ -84,19 +90,51 @@ class Robot:
     @cached_property
     def chain(self) -> Indices:
         """Indices into v of the velocities that move the task frame, without a gripper's."""
-        model = self.model
-        carrying = model.supports[model.frames[self.frame_id].parentJoint]
-        moved = [
-            range(joint.idx_v, joint.idx_v + joint.nv)
-            for joint in (model.joints[index] for index in carrying)
-            if joint.idx_v >= 0
-        ]
-        return np.array([index for indices in moved for index in indices], dtype=np.intp)
+        joints = [self.model.joints[index] for index in self._carrying]
+        moved = {joint.idx_v + k for joint in joints for k in range(joint.nvExtended)}
+        return np.array(sorted(moved), dtype=np.intp)
+
+    @cached_property
+    def _carrying(self) -> list[int]:
+        """Pinocchio's indices of the joints that move the task frame, from the root on."""
+        return list(self.model.supports[self.model.frames[self.frame_id].parentJoint])[1:]
+
+    @cached_property
+    def shoulder(self) -> Array:
+        """Origin of the first joint that moves the task frame, (3,) [m], in the world."""
+        origin: Array = self.model.jointPlacements[self._carrying[0]].translation
+        return origin
+
+    @cached_property
+    def joint_scale(self) -> Array:
+        """Displacement of each joint that counts like one radian, (nv,).
+
+        1 where a joint turns or has no end; 1/(2 pi) of its range [m] where it slides.
+        """
+        scale, position = np.ones(self.nv), self.limits.position
+        for joint in self.model.joints:
+            sliding = joint.shortname().startswith(("JointModelPX", "JointModelPY", "JointModelPZ"))
+            sliding = sliding or joint.shortname() == "JointModelPrismaticUnaligned"
+            if sliding and position is not None:
+                stroke = position.upper[joint.idx_v] - position.lower[joint.idx_v]
+                if 0 < stroke < np.inf:
+                    scale[joint.idx_v] = stroke / (2 * np.pi)
+        return scale
 
     def reach_of(self, placement: Any) -> float:
         """Compute the distance [m] of a placement (`pinocchio.SE3`) from the first joint."""
-        first = self.model.jointPlacements[1].translation
-        return float(np.linalg.norm(placement.translation - first))
+        return float(np.linalg.norm(placement.translation - self.shoulder))
+
+    def inside(self, q: Array) -> Array:
+        """Return a configuration (nq,), with joints outside their position limits moved there."""
+        position, index = self.limits.position, self.limits.q_index
+        if position is None:
+            return q
+        limited, moved = index >= 0, q.copy()
+        moved[index[limited]] = np.clip(
+            q[index[limited]], position.lower[limited], position.upper[limited]
+        )
+        return moved
 
     def with_limits(
         self,
@@ -147,7 +185,11 @@ def frame_id(model: Any, frame: str) -> int:
     if not model.existFrame(frame):
         frames = sorted({f.name for f in model.frames} - {"universe"})
         raise unknown("frame", frame, frames, f"of robot {model.name!r}")
-    return int(model.getFrameId(frame))
+    # A joint and a link may have one name: the link is meant.
+    body = pin.FrameType.BODY
+    if model.existFrame(frame, body):
+        return int(model.getFrameId(frame, body))
+    return next(index for index, each in enumerate(model.frames) if each.name == frame)
 
 
 def checked_vector(value: object, size: int, what: str) -> Array:

@@ -21,7 +21,6 @@ from dikbench.problem.tasks import (
     TrackingTask,
     TrackingTogether,
 )
-from dikbench.robots.catalogue import load_robot
 from dikbench.robots.collision.obstacles import (
     BoxObstacle,
     CapsuleObstacle,
@@ -29,6 +28,7 @@ from dikbench.robots.collision.obstacles import (
     SphereObstacle,
 )
 from dikbench.robots.kinematics import Kinematics, smallest_singular_value
+from dikbench.robots.loading import load_robot
 from dikbench.robots.payload import with_payload
 from dikbench.robots.robot import Robot
 from dikbench.scenario.building import (
@@ -59,6 +59,7 @@ from dikbench.scenario.oracle import (
     joint_oracle,
     measure_motion,
     oracle_motion,
+    position_margin,
     solve_placement,
 )
 from dikbench.scenario.reference.curves import circle, lemniscate, plane_of
@@ -71,6 +72,7 @@ from dikbench.scenario.singularity import (
     Kind,
     Singularity,
     analyse,
+    body_twist,
     make_singular,
     singular_postures,
 )
@@ -120,6 +122,7 @@ __all__ = [
     "Variation",
     "analyse",
     "at_constant_rate",
+    "body_twist",
     "check_can_lift",
     "circle",
     "collision_claims",
@@ -142,6 +145,7 @@ __all__ = [
     "oracle_motion",
     "placement_of",
     "plane_of",
+    "position_margin",
     "read_obstacles",
     "read_poses",
     "samples",

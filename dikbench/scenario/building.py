@@ -40,20 +40,31 @@ def limits_in_force(robot: Robot, *, acceleration: bool) -> Robot:
     if not acceleration:
         return robot.with_limits(acceleration=None)
     if robot.available_acceleration is None:
-        raise DikbenchError(f"robot {robot.name}: no acceleration limits are known")
+        raise DikbenchError(
+            f"robot {robot.name}: no acceleration limits are known; valid: acceleration=false, or "
+            "numbers [rad/s^2], such as acceleration=10"
+        )
     return robot.with_limits(acceleration=robot.available_acceleration)
 
 
-def influence_distance(*, acceleration: bool) -> float:
+def acceleration_asked(value: bool | float | str) -> tuple[bool, float | str | None]:
+    """Read a family's `acceleration`: whether limits are in force, and which if given by hand."""
+    word = str(value).strip().lower()
+    if word in ("true", "false"):
+        return word == "true", None
+    return True, value
+
+
+def influence_distance(robot: Robot) -> float:
     """Return the distance [m] below which a collision pair has a row."""
-    return 0.5 if acceleration else 0.1
+    return 0.1 if robot.limits.acceleration is None else 0.5
 
 
 def secondary_tasks(
     robot: Robot, posture: Array, tracking: TrackingTask = POSE
 ) -> tuple[Task, ...]:
     """Hold a posture in the null space, where the arm has one."""
-    if robot.nv <= len(tracking.rows(robot)):
+    if len(robot.chain) <= len(tracking.rows(robot)):
         return ()
     return (PostureTask(target=posture, gain=1.0, weight=POSTURE_WEIGHT),)
 
@@ -101,10 +112,10 @@ def least_norm_share(robot: Robot, q: Array, joint: int, tracking: TrackingTask 
     It is the entry (joint, joint) of J^+ J at configurations q (k, nq): 1 where no other joint
     velocity has this effect, less where the null space contains a part of it.
     """
-    kinematics, rows, shares = Kinematics(robot), np.array(tracking.rows(robot)), []
+    kinematics, rows, shares = Kinematics(robot), tracking.rows(robot), []
     for sample in q:
         kinematics.update(sample)
-        J = kinematics.jacobian(robot.frame_id)[rows]
+        J = kinematics.task_jacobian(rows)
         shares.append(pseudo_inverse(J, 1e-6)[joint] @ J[:, joint])
     return float(min(shares))
 
@@ -253,7 +264,7 @@ def check_can_lift(robot: Robot, certified: tuple[str, ...]) -> None:
     Raises:
         DikbenchError: if it moves in a plane; the message lists the `certified` robots.
     """
-    if 2 not in robot.task_rows:
+    if 2 not in robot.movable_rows:
         raise DikbenchError(
             f"robot {robot.name} moves in a plane and cannot lift; "
             f"valid: {', '.join(certified)}, a URDF"

@@ -15,9 +15,12 @@ from dikbench.parameters import Parameters, Range, parameters_of
 from dikbench.problem.constraints import Constraint
 from dikbench.problem.embedding import embedding_of
 from dikbench.problem.tasks import PoseTask, Task, TrackingTask, TrackingTogether
-from dikbench.robots.catalogue import load_robot
+from dikbench.robots.catalogue import ROBOTS
+from dikbench.robots.loading import load_robot
 from dikbench.robots.robot import Robot
+from dikbench.robots.urdf import Root
 from dikbench.scenario.building import (
+    acceleration_asked,
     limits_in_force,
     samples,
     secondary_tasks,
@@ -98,9 +101,17 @@ class Family(Parameters, ABC):
     Attributes:
         robot: a robot's name, or the path of a URDF.
         frame: the task frame; default: the robot's.
+        rows: the rows of the frame's twist that are asked for, such as xyz for its position alone
+            (see `load_robot`); default: all that the robot can move.
+        lock: joints that do not move, separated by spaces, with or without positions
+            (`finger=0.02`).
+        root: what is between the world and a URDF's root link.
+        velocity: velocity limits [rad/s or m/s], one for all joints or one for each, separated by
+            spaces; default: the robot's.
         gain: gain of the tracking task.
         dt: control period.
-        acceleration: whether acceleration limits are in force.
+        acceleration: whether acceleration limits are in force, or which [rad/s^2 or m/s^2], one for
+            all joints or one for each, separated by spaces.
         robots: robots on which the defaults are certified, where the family takes any robot.
         variation: the ranges of what a seed perturbs.
         grid: the two parameters of a phase diagram, horizontal and vertical.
@@ -112,9 +123,13 @@ class Family(Parameters, ABC):
 
     robot: str = "panda"
     frame: str | None = None
+    rows: str | None = None
+    lock: str = ""
+    root: Root = "fixed"
+    velocity: float | str | None = None
     gain: Gain = 5.0
     dt: Time = 0.01
-    acceleration: bool = False
+    acceleration: bool | float | str = False
 
     robots: ClassVar[tuple[str, ...]] = ()
     variation: ClassVar[Variation] = NO_VARIATION
@@ -164,8 +179,7 @@ class Family(Parameters, ABC):
             CertificateFailed: if a claim does not hold.
         """
         change = self.variation.drawn(seed)
-        arm = limits_in_force(load_robot(self.robot, self.frame), acceleration=self.acceleration)
-        case = self.case(arm, change)
+        case = self.case(arm := self._arm(), change)
         _check_case(case)
         robot = arm if case.robot is None else case.robot
         tracking, tasks, v0 = case.tracking, case.tasks, case.v0
@@ -218,6 +232,31 @@ class Family(Parameters, ABC):
         if made.feasible == "unknown" and (reason := infeasible_because(made)):
             return replace(made, feasible="no", infeasible_because=reason)
         return made
+
+    def _arm(self) -> Robot:
+        """Load the robot, with its limits in force.
+
+        Raises:
+            DikbenchError: if there is none, or fewer joints move its frame than rows are asked for.
+        """
+        in_force, by_hand = acceleration_asked(self.acceleration)
+        arm = load_robot(
+            self.robot,
+            self.frame,
+            rows=self.rows,
+            lock=self.lock,
+            root=self.root,
+            velocity=self.velocity,
+            acceleration=by_hand,
+        )
+        if self.robot not in ROBOTS and len(arm.chain) < len(arm.task_rows):
+            wanted = "a pose" if self.rows is None else f"rows={self.rows}"
+            raise DikbenchError(
+                f"frame {arm.frame} is moved by {len(arm.chain)} joints, {wanted} has "
+                f"{len(arm.task_rows)} rows: give rows=..., at most as many "
+                "as joints, such as rows=xyz for the position alone"
+            )
+        return limits_in_force(arm, acceleration=in_force)
 
     def exact_motion(
         self,

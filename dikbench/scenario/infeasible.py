@@ -210,7 +210,7 @@ def _short_of_distances(scenario: Scenario, kinematics: Kinematics) -> tuple[flo
 def _is_regular(scenario: Scenario, q: Array) -> bool:
     """Say whether no singularity is on a branch (k, nq), nor as far aside as is allowed."""
     robot, kinematics, signs = scenario.robot, Kinematics(scenario.robot), set()
-    rows, chain = np.array(scenario.rows), robot.chain
+    rows, chain = scenario.rows, robot.chain
     for number in np.unique(np.linspace(0, len(q) - 1, BRANCH_SAMPLES).astype(int)):
         kinematics.update(q[number])
         _, sizes, directions = np.linalg.svd(_tangents(scenario, kinematics), full_matrices=False)
@@ -223,6 +223,6 @@ def _is_regular(scenario: Scenario, q: Array) -> bool:
         )
         for step in steps:
             kinematics.update(pin.integrate(robot.model, q[number], step))
-            J = kinematics.jacobian(robot.frame_id)[np.ix_(rows, chain)]
+            J = kinematics.task_jacobian(rows)[:, chain]
             signs.add(np.sign(np.linalg.det(J)))
     return len(signs) == 1

@@ -69,7 +69,8 @@ def solve_placement(
     """Find a configuration that does a tracking task, by damped Gauss-Newton from `seed`.
 
     Steps are Levenberg-Marquardt with damping by the squared error (Sugihara 2011) of at most
-    0.3 rad; position limits are ignored.
+    0.3 rad; position limits are ignored. Joints that slide count by their range
+    (`Robot.joint_scale`), so that a short one is not taken far outside where others can move.
 
     Args:
         robot: the robot.
@@ -87,13 +88,13 @@ def solve_placement(
     for _ in range(iterations):
         kinematics.update(q)
         task = tracking.linearize(kinematics, target)
-        e, J = task.error, task.J
+        e, J = task.error, task.J * robot.joint_scale
         before, error = error, float(np.linalg.norm(e))
         if error < 1e-12 or (error < 1e-9 and error >= before):
             return q  # there, up to rounding
         H = J.T @ J
         H.flat[:: len(H) + 1] += 0.1 * error**2 + 1e-12
-        step = np.linalg.solve(H, J.T @ e)
+        step = robot.joint_scale * np.linalg.solve(H, J.T @ e)
         largest = float(np.abs(step).max())
         q = pin.integrate(robot.model, q, step * min(1.0, 0.3 / max(largest, 1e-300)))
     raise DikbenchError(
@@ -151,7 +152,7 @@ def measure_motion(
     exact: Callable[[float], Array] | None = None,
 ) -> OracleMotion:
     """Measure a joint motion (k + 1, nq) at its instants (k + 1,) [s] (see `OracleMotion`)."""
-    model, rows = robot.model, np.array(tracking.rows(robot))
+    model, rows = robot.model, tracking.rows(robot)
     periods = np.diff(instants)
     v = np.array(
         [pin.difference(model, q[k], q[k + 1]) / period for k, period in enumerate(periods)]
@@ -160,7 +161,7 @@ def measure_motion(
     sigma, margin, reach = [], [], []
     for sample in q:
         kinematics.update(sample)
-        sigma.append(smallest_singular_value(kinematics.jacobian(robot.frame_id)[rows]))
+        sigma.append(smallest_singular_value(kinematics.task_jacobian(rows)))
         margin.append(position_margin(robot, sample))
         reach.append(robot.reach_of(kinematics.placement(robot.frame_id)))
     limit = robot.limits.velocity
@@ -173,9 +174,11 @@ def measure_motion(
 def position_margin(robot: Robot, q: Array) -> float:
     """Compute the smallest distance [rad] of q (nq,) to a position limit, negative outside.
 
-    Only joints that move the task frame count.
+    A sliding joint counts by its share of its range, 2 pi for all of it (`Robot.joint_scale`); one
+    that does not move the task frame counts where it is outside.
     """
-    limits, chain = robot.limits.at(q), robot.chain
+    limits = robot.limits.at(q)
     if limits.to_lower is None or limits.to_upper is None:
         return float("inf")
-    return float(min(limits.to_lower[chain].min(), limits.to_upper[chain].min()))
+    margins = np.minimum(limits.to_lower, limits.to_upper) / robot.joint_scale
+    return float(min(margins[robot.chain].min(), margins.min() if margins.min() < 0 else np.inf))

@@ -82,12 +82,12 @@ def analyse(robot: Robot, q: Array) -> Singularity:
     Raises:
         DikbenchError: if the posture is not singular, or loses more than one direction.
     """
-    kinematics, rows = Kinematics(robot), np.array(robot.task_rows)
+    kinematics = Kinematics(robot)
     kinematics.update(q)
-    J = kinematics.jacobian(robot.frame_id)[rows].copy()
+    J = kinematics.task_jacobian()
     placement = kinematics.placement(robot.frame_id).copy()
     U, singular, Vt = np.linalg.svd(J)
-    m = len(rows)
+    m = len(J)
     if singular[m - 1] > 1e3 * ZERO_SINGULAR_VALUE or singular[m - 2] < 1e-4:
         raise DikbenchError(
             f"robot {robot.name}: the posture does not lose exactly one direction, its smallest "
@@ -107,13 +107,11 @@ def analyse(robot: Robot, q: Array) -> Singularity:
         kind = "crossing"
     elif curvatures.min() > -ZERO_CURVATURE or curvatures.max() < ZERO_CURVATURE:
         kind = "fold"
-    lost = np.zeros(6)
-    lost[rows] = n
     return Singularity(
         q=q,
         placement=placement,
         jacobian=J,
-        lost=lost,
+        lost=body_twist(robot, placement, n),
         kind=kind,
         inward=float(np.sign(curvatures[strongest])),
         bend=Z @ directions[:, strongest],
@@ -136,15 +134,14 @@ def make_singular(robot: Robot, seed: Array, *, fixed: tuple[int, ...] = ()) -> 
     Raises:
         DikbenchError: if the smallest singular value does not converge to zero.
     """
-    rows, nv = np.array(robot.task_rows), robot.nv
-    m = len(rows)
+    nv, m = robot.nv, len(robot.task_rows)
     kinematics = Kinematics(robot)
-    free = np.setdiff1d(np.arange(nv), fixed)
+    free = np.setdiff1d(robot.chain, fixed)
     q = seed
     sigma = np.inf
     for _ in range(50):
         kinematics.update(q)
-        J = kinematics.jacobian(robot.frame_id)[rows]
+        J = kinematics.task_jacobian()
         U, singular, _ = np.linalg.svd(J)
         u, sigma = U[:, -1], float(singular[m - 1])
         if sigma < ZERO_SINGULAR_VALUE:
@@ -173,7 +170,10 @@ def singular_postures(robot: Robot, margin: float, attempts: int = 24) -> Iterat
     random = np.random.default_rng(0)
     for attempt in range(attempts):
         spread = 1.5 * attempt / attempts
-        seed = pin.integrate(robot.model, robot.q0, random.uniform(-spread, spread, robot.nv))
+        step = np.zeros(robot.nv)
+        drawn = random.uniform(-spread, spread, robot.nv)
+        step[robot.chain] = (robot.joint_scale * drawn)[robot.chain]
+        seed = pin.integrate(robot.model, robot.q0, step)
         try:
             q = make_singular(robot, seed)
         except DikbenchError:
@@ -183,13 +183,29 @@ def singular_postures(robot: Robot, margin: float, attempts: int = 24) -> Iterat
 
 
 def _jacobian_derivatives(robot: Robot, q: Array) -> Array:
-    """Compute dJ/dq_k of the rows that the arm can move, by central differences, (nv, m, nv)."""
-    rows, nv = np.array(robot.task_rows), robot.nv
+    """Compute dJ/dq_k of the task Jacobian, by central differences, (nv, m, nv)."""
+    nv = robot.nv
     kinematics, unit = Kinematics(robot), np.eye(nv)
-    derivatives = np.empty((nv, len(rows), nv))
-    for k in range(nv):
+    derivatives = np.zeros((nv, len(robot.task_rows), nv))
+    for k in robot.chain:
         kinematics.update(pin.integrate(robot.model, q, STEP_RAD * unit[k]))
-        ahead = kinematics.jacobian(robot.frame_id)[rows].copy()
+        ahead = kinematics.task_jacobian()
         kinematics.update(pin.integrate(robot.model, q, -STEP_RAD * unit[k]))
-        derivatives[k] = (ahead - kinematics.jacobian(robot.frame_id)[rows]) / (2 * STEP_RAD)
+        derivatives[k] = (ahead - kinematics.task_jacobian()) / (2 * STEP_RAD)
     return derivatives
+
+
+def body_twist(robot: Robot, placement: Any, task_twist: Array) -> Array:
+    """Write the task rows of a twist as a body twist (6,), whose other rows are zero.
+
+    Args:
+        robot: the robot.
+        placement: of the task frame (`pinocchio.SE3`).
+        task_twist: the rows, in the robot's task axes, (m,).
+    """
+    twist = np.zeros(6)
+    twist[list(robot.task_rows)] = task_twist
+    if robot.task_axes == "world":
+        R = placement.rotation
+        twist = np.concatenate([R.T @ twist[:3], R.T @ twist[3:]])
+    return twist

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -20,7 +21,7 @@ class Variation:
 
     Attributes:
         start: largest displacement of each joint of the posture from which the motion is built
-            [rad or m].
+            [rad], of a sliding joint by its share of its range (`Robot.joint_scale`).
         direction: largest rotation of the direction of the motion [rad].
         timing: largest change of the motion's duration, as a share of it.
     """
@@ -65,14 +66,29 @@ class Perturbation:
     ranges: Variation
     seed: int
 
-    def posture(self, robot: Robot, q: Array, fixed: tuple[int, ...] = ()) -> Array:
-        """Move the joints of a configuration (nq,), except those (indices into v) in `fixed`."""
+    def posture(
+        self,
+        robot: Robot,
+        q: Array,
+        fixed: Sequence[int] = (),
+        moving: Sequence[int] | None = None,
+    ) -> Array:
+        """Move joints of a configuration (nq,), not past their position limits.
+
+        Args:
+            robot: the robot.
+            q: the configuration.
+            fixed: joints that do not move (indices into v).
+            moving: joints that do; default: those that move the task frame.
+        """
         if self.seed == 0 or self.ranges.start == 0:
             return q
         step = self._random(0).uniform(-self.ranges.start, self.ranges.start, robot.nv)
+        still = np.setdiff1d(np.arange(robot.nv), robot.chain if moving is None else moving)
+        step[still] = 0.0
         step[list(fixed)] = 0.0
-        moved: Array = pin.integrate(robot.model, q, step)
-        return moved
+        moved: Array = pin.integrate(robot.model, q, robot.joint_scale * step)
+        return robot.inside(moved)
 
     def rotation(self, robot: Robot) -> Array:
         """Draw a rotation (3, 3) of directions; a planar arm keeps to its plane."""
@@ -81,7 +97,7 @@ class Perturbation:
         random = self._random(1)
         axis = random.normal(size=3)
         angle = random.uniform(-self.ranges.direction, self.ranges.direction)
-        if 2 not in robot.task_rows:
+        if 2 not in robot.movable_rows:
             axis = np.array([0.0, 0.0, 1.0])
         turned: Array = pin.exp3(angle * axis / float(np.linalg.norm(axis)))
         return turned

@@ -18,6 +18,7 @@ from dikbench.problem.posing import pose_problem
 from dikbench.problem.problem import Formulation, program_of, refusal_of
 from dikbench.problem.progress import STUCK_PROGRESS, progress, row_weights
 from dikbench.problem.tasks import LinearizedTask, PoseTask, Task
+from dikbench.problem.tasks.rows import in_task_axes
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.robot import Robot, checked_vector
 from dikbench.simulation.control_step import TrialEnded, control_step
@@ -169,7 +170,8 @@ def _twist_task(kinematics: Kinematics, twist: object, reference_frame: str) -> 
     elif reference_frame == "WORLD":
         V = X.toActionMatrixInverse() @ V
     rows = np.array(robot.task_rows)
-    return LinearizedTask(kinematics.jacobian(robot.frame_id)[rows], V[rows], np.zeros(len(rows)))
+    V = np.concatenate([in_task_axes(robot, X.rotation, part) for part in (V[:3], V[3:])])
+    return LinearizedTask(kinematics.task_jacobian(), V[rows], np.zeros(len(rows)))
 
 
 def _target_task(kinematics: Kinematics, target: Any, gain: float) -> LinearizedTask:

@@ -86,7 +86,7 @@ def _out_of_the_plane(scenario: Scenario) -> Iterator[str]:
     lost = [
         row
         for row in range(6)
-        if row not in robot.task_rows and any((row < 3) == (other < 3) for other in tracked)
+        if row not in robot.movable_rows and any((row < 3) == (other < 3) for other in tracked)
     ]
     kinematics = Kinematics(robot)
     kinematics.update(scenario.q0)

@@ -17,8 +17,8 @@ from dikbench.problem.posing import pose_problem
 from dikbench.problem.problem import DikProblem
 from dikbench.problem.tasks import PoseTask, PostureTask
 from dikbench.problem.velocity_box import velocity_box
-from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.loading import load_robot
 from dikbench.robots.robot import Robot
 
 CONTROL_PERIOD_S: Final = 0.01

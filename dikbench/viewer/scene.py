@@ -82,7 +82,7 @@ def _look_at(viewer: Any, points: Array, side: Array, size: float) -> None:
 
 def _side(robot: Robot, path: Array) -> Array:
     """Choose the side from which to see a path (k, 3): a planar arm's from above."""
-    if 2 not in robot.task_rows:
+    if 2 not in robot.movable_rows:
         return np.array([0.0, -0.01, 1.0])
     x, y, _ = path.mean(axis=0)
     towards = np.arctan2(y, x) - CAMERA_YAW_RAD

@@ -6,12 +6,12 @@ import contextlib
 import pickle
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_formulation, make_scenario
-from dikbench.selector import Selector, parse_selector
+from dikbench.selector import Selector, alternatives, parse_selector, quoted
 from dikbench.solvers.catalogue.back_ends import BACK_ENDS, parse_solver
 
 # Texts that look like selectors, so that the fuzz gets past the first check.
@@ -22,7 +22,9 @@ pieces = st.sampled_from(
 texts = st.one_of(st.text(max_size=40), st.lists(pieces, max_size=9).map("".join))
 
 names = st.text(
-    st.characters(blacklist_characters="[]", blacklist_categories=("Cs", "Zs", "Zl", "Zp", "Cc")),
+    st.characters(
+        blacklist_characters="[]'\"", blacklist_categories=("Cs", "Zs", "Zl", "Zp", "Cc")
+    ),
     min_size=1,
     max_size=12,
 )
@@ -164,3 +166,21 @@ def test_any_text_makes_a_scenario_or_is_an_error_of_ours(text: str, seed: int) 
     for selector in (text, f"near-miss[miss={text}]", f"reach[robot={text}]"):
         with contextlib.suppress(DikbenchError):
             make_scenario(selector, seed)
+
+
+@given(
+    name=st.text(min_size=1).filter(lambda text: not {"'", '"'} <= set(text)),
+    value=st.text(min_size=1).filter(lambda text: not {"'", '"'} <= set(text)),
+)
+@example(name="my arm, left [v2].py:Law", value="a=1 b|c, d")
+@example(name="o'brien.py:Law", value="o'brien.urdf")
+def test_any_name_and_value_can_be_selected_in_quotes(name: str, value: str) -> None:
+    """Such as paths with commas, brackets, bars and blanks; in a list each value has its own."""
+    selector = Selector(name, {"file": value})
+    assert parse_selector(str(selector)) == selector
+    assert alternatives(str(selector)) == [selector]
+    inside = quoted(value)
+    assert alternatives(f"a[file={inside}|other{value == 'other'}]") == [
+        Selector("a", {"file": value}),
+        Selector("a", {"file": f"other{value == 'other'}"}),
+    ]

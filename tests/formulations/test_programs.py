@@ -19,8 +19,8 @@ from dikbench.linear_algebra import null_space
 from dikbench.plugins.building import make_formulation
 from dikbench.problem import DikProblem
 from dikbench.problem.tasks import LinearizedTask, OrientationTask, PositionTask, PostureTask
-from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.loading import load_robot
 from dikbench.robots.robot import Robot
 from dikbench.solvers.checked_solve import make_solve
 from dikbench.testing.states import SINGULAR

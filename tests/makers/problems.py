@@ -21,8 +21,8 @@ from dikbench.problem import (
     program_of,
 )
 from dikbench.programs.quadratic_program import QuadraticProgram
-from dikbench.robots.catalogue import load_robot
 from dikbench.robots.limits import JointLimits
+from dikbench.robots.loading import load_robot
 from dikbench.robots.planar_arm import planar_arm
 from dikbench.robots.robot import model_limits
 from dikbench.solvers.catalogue.back_ends import parse_solver
@@ -33,7 +33,8 @@ def planar_robot(*lengths: float, velocity: float) -> Robot:
     """Make a planar arm of links [m] whose task is its tip, limited in velocity [rad/s]."""
     model = planar_arm(lengths, velocity_limits=(velocity,) * len(lengths))
     q0 = np.zeros(len(lengths))
-    return Robot(f"planar{len(lengths)}r", model, "tip", model_limits(model), q0, (0, 1))
+    limits = model_limits(model)
+    return Robot(f"planar{len(lengths)}r", model, "tip", limits, q0, (0, 1), movable_rows=(0, 1))
 
 
 def with_limits_in_force(name: str, kinds: str) -> Robot:

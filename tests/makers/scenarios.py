@@ -15,7 +15,7 @@ from dikbench.errors import DikbenchError
 from dikbench.metrics import evaluate, motion_of
 from dikbench.plugins.building import make_formulation, make_plant, make_scenario
 from dikbench.problem import DikProblem, Formulation, PoseTask, Solve
-from dikbench.robots.catalogue import load_robot
+from dikbench.robots.loading import load_robot
 from dikbench.scenario import (
     Certificate,
     Robot,
@@ -134,7 +134,7 @@ def scenario_error(selector: str) -> str:
 def put_robot(monkeypatch: pytest.MonkeyPatch, robot: object) -> None:
     """Make every family find this robot, whatever the name that it asks for."""
     module = sys.modules["dikbench.scenario.family"]
-    monkeypatch.setattr(module, "load_robot", lambda name, frame: robot)
+    monkeypatch.setattr(module, "load_robot", lambda *given, **named: robot)
 
 
 def known_singularity(robot: str, name: str) -> tuple[Robot, Singularity]:

@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_scenario
-from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.loading import load_robot
 from scenarios.back_and_forth import SET_UPS
 
 # Frame, scale and roll about x, as published.

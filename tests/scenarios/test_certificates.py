@@ -14,8 +14,8 @@ from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_scenario
 from dikbench.plugins.finding import plugins
 from dikbench.problem.tasks import PostureTask
-from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.loading import load_robot
 from dikbench.robots.robot import Robot
 from dikbench.scenario import Scenario
 from dikbench.scenario.certificate import Certificate, Claim

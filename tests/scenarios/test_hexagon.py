@@ -9,8 +9,8 @@ from makers.scenarios import TWENTY_SEEDS, metrics_of, put_robot, scenario_error
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_scenario
-from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.loading import load_robot
 from dikbench.robots.robot import Robot
 from dikbench.scenario import Scenario
 

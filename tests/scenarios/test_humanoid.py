@@ -17,7 +17,7 @@ from dikbench.plugins.building import make_formulation, make_scenario
 from dikbench.plugins.finding import plugins
 from dikbench.problem import program_of
 from dikbench.problem.tasks import PoseTask
-from dikbench.robots.catalogue import load_robot
+from dikbench.robots.loading import load_robot
 from dikbench.scenario import Scenario
 from dikbench.scenario.plant import Ideal
 from dikbench.simulation.closed_loop import simulate

@@ -14,8 +14,8 @@ from dikbench.errors import DikbenchError
 from dikbench.metrics import evaluate, motion_of
 from dikbench.parameters import Range
 from dikbench.plugins.building import make_plant, make_scenario
-from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.loading import load_robot
 from dikbench.simulation.closed_loop import simulate
 from dikbench.simulation.oracle_formulation import OracleFormulation
 from dikbench.solvers.checked_solve import make_solve

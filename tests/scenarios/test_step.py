@@ -11,8 +11,8 @@ from makers.scenarios import metrics_of, put_robot, scenario_error
 
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_scenario
-from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.loading import load_robot
 from dikbench.scenario import Scenario
 from dikbench.scenario.oracle import solve_placement
 from scenarios.step import DIRECTIONS

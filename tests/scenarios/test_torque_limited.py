@@ -12,7 +12,7 @@ from makers.scenarios import run_of
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_scenario
-from dikbench.robots.catalogue import load_robot
+from dikbench.robots.loading import load_robot
 from dikbench.robots.robot import Robot
 from dikbench.scenario import Scenario
 from dikbench.simulation.status import STEP_CODE, Status

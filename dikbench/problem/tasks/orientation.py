@@ -26,15 +26,16 @@ class OrientationTask(FrameTask):
         e = log3(R^T R_d),   V = R^T R_d w_d + gain e,   J v = V
 
     with R the frame's rotation, R_d the target's, w_d the angular part of the target's body twist
-    and J the angular rows of the body Jacobian, (3, nv) [rad/s] in the axes of the frame. On an arm
-    that cannot move some of these rows (`Robot.task_rows`) they are left out.
+    and J the angular rows of the body Jacobian, (3, nv) [rad/s] in the axes of the frame. Rows that
+    the arm cannot move (`Robot.movable_rows`) are left out. On a robot whose task axes are the
+    world's, all are in them.
 
     The target is a rotation R_d, (3, 3), or a placement (`pinocchio.SE3`).
     """
 
     def rows(self, robot: Robot) -> tuple[int, ...]:
         """See `FrameTask`."""
-        return tuple(row for row in robot.task_rows if row >= 3)
+        return tuple(row for row in robot.movable_rows if row >= 3)
 
     def linearize(
         self, kinematics: Kinematics, target: Any = None, velocity: Any = None
@@ -48,13 +49,18 @@ class OrientationTask(FrameTask):
         R_d = part_of_target(
             goal, "rotation", (3, 3), "orientation task: expected a rotation (3, 3)"
         )
-        relative = kinematics.placement(index).rotation.T.dot(R_d)
+        R = kinematics.placement(index).rotation
+        relative = R.T.dot(R_d)
         error: Array = pin.log3(relative)
         V = self.gain * error
         if velocity is not None:
             V += relative.dot(velocity.angular)
         J = kinematics.jacobian(index)
         kept = rows - 3
+        if robot.task_axes == "world":
+            J, V, error = J.copy(), R @ V, R @ error
+            J[3:] = R @ J[3:]
+            relative = R @ relative @ R.T
         return LinearizedOrientation(
             J[rows], V[kept], error[kept], self.weight, self.priority, relative, kept
         )
@@ -64,7 +70,8 @@ class LinearizedOrientation(LinearizedTask, eq=False):
     """An orientation task at one configuration.
 
     Attributes:
-        relative: R^T R_d, the target seen from the frame.
+        relative: R^T R_d, the target seen from the frame; R_d R^T where the task axes are the
+            world's.
         kept: the angular rows that are kept.
     """
 

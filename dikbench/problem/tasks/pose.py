@@ -10,9 +10,11 @@ import pinocchio as pin
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
+from dikbench.problem.tasks.rows import in_task_axes, orientation_error
 from dikbench.problem.tasks.task import FrameTask, LinearizedTask, check_weight
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.robot import Robot
+from dikbench.robots.task_rows import ALL_ROWS, PLANE_ROWS
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,8 +24,13 @@ class PoseTask(FrameTask):
         e = log6(X^-1 X_d),   V = Ad(X^-1 X_d) V_d + gain e,   J v = V
 
     with X the placement of the frame, X_d the target, V_d the target's own body twist and J the
-    body Jacobian: twists are (linear; angular) [m/s; rad/s] in the axes of the frame. On an arm
-    that cannot move some rows of the twist (`Robot.task_rows`) they are left out.
+    body Jacobian: twists are (linear; angular) [m/s; rad/s] in the axes of the frame. In the plane
+    (`Robot.task_rows` of (0, 1, 5)) the other rows are left out. Where other rows are asked for,
+    position and orientation are brought there independently, in the robot's task axes:
+
+        e = (R^T (p_d - p); rotation error),   V = (R^T R_d v_d; R^T R_d w_d) + gain e
+
+    with the rotation error of `dikbench.problem.tasks.rows.orientation_error`.
 
     The target is a placement X_d (`pinocchio.SE3`).
     """
@@ -44,7 +51,10 @@ class PoseTask(FrameTask):
                 f"pose task: expected a pinocchio.SE3 as target, got {type(X_d).__name__}"
             )
         check_weight("pose task", self.weight, len(robot.task_rows))
-        relative = kinematics.placement(index).actInv(X_d)
+        X = kinematics.placement(index)
+        if robot.task_rows not in (ALL_ROWS, PLANE_ROWS) or robot.task_axes == "world":
+            return self._parts(kinematics, X, X_d, velocity)
+        relative = X.actInv(X_d)
         error: Array = pin.log6(relative).np
         V = self.gain * error
         if velocity is not None:
@@ -56,6 +66,24 @@ class PoseTask(FrameTask):
         return LinearizedPose(
             J[rows], V[rows], error[rows], self.weight, self.priority, relative, rows
         )
+
+    def _parts(self, kinematics: Kinematics, X: Any, X_d: Any, velocity: Any) -> LinearizedTask:
+        """Linearise position and orientation independently, only the rows that are asked for."""
+        robot, R = kinematics.robot, X.rotation
+        Q = R.T @ X_d.rotation
+        rows = np.array(robot.task_rows)
+        error = np.zeros(6)
+        error[:3] = in_task_axes(robot, R, R.T @ (X_d.translation - X.translation))
+        asked = [row - 3 for row in robot.task_rows if row >= 3]
+        if asked:
+            error[3:] = orientation_error(robot, Q, R, asked)
+        V = self.gain * error
+        if velocity is not None:
+            V[:3] += in_task_axes(robot, R, Q @ velocity.linear)
+            V[3:] += in_task_axes(robot, R, Q @ velocity.angular)
+        J = kinematics.jacobian(self.frame_id(robot))
+        J = np.vstack([in_task_axes(robot, R, J[:3]), in_task_axes(robot, R, J[3:])])
+        return LinearizedTask(J[rows], V[rows], error[rows], self.weight, self.priority)
 
 
 class LinearizedPose(LinearizedTask, eq=False):

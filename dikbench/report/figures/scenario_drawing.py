@@ -46,7 +46,7 @@ def draw_scenario(selector: str, file: Path) -> None:
     with style():
         figure = plt.figure(figsize=(10.0, 5.6))
         grid = figure.add_gridspec(3, 2, width_ratios=(1.25, 1.0))
-        planar = 2 not in scenario.robot.task_rows
+        planar = 2 not in scenario.robot.movable_rows
         left = figure.add_subplot(grid[:, 0], **({} if planar else {"projection": "3d"}))
         _draw_way(left, scenario, planar)
         right = [figure.add_subplot(grid[row, 1]) for row in range(3)]

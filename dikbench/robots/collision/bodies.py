@@ -41,11 +41,18 @@ def collision_bodies(robot: Robot) -> Any:
 
 def _from_urdf(robot: Robot) -> Any:
     full, fitted = _fitted(str(robot.urdf))
-    moving = set(robot.model.names)
-    locked = [full.getJointId(name) for name in full.names if name not in moving]
-    if not locked:
-        return fitted.copy()
-    _, bodies = pin.buildReducedModel(full, fitted, locked, pin.neutral(full))
+    bodies, frames = pin.GeometryModel(), robot.model.frames
+    for body in fitted.geometryObjects:
+        # The frame of its link, which is there whatever joints are locked.
+        link = full.frames[body.parentFrame]
+        index = robot.model.getFrameId(link.name, link.type)
+        within = link.placement.actInv(body.placement)
+        placement = frames[index].placement * within
+        bodies.addGeometryObject(
+            pin.GeometryObject(
+                body.name, frames[index].parentJoint, index, placement, body.geometry
+            )
+        )
     return bodies
 
 

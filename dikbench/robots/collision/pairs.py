@@ -21,6 +21,7 @@ from dikbench.arrays import Array, Indices
 from dikbench.robots.collision.bodies import collision_bodies
 from dikbench.robots.collision.obstacles import Obstacle
 from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.mimic import coupling
 from dikbench.robots.robot import Robot
 
 DISTANCE_TOLERANCE_M = 1e-10
@@ -69,6 +70,7 @@ class CollisionPairs:
         )
         moved = _moved(robot.model)
         self._signs = np.array([moved[b] - moved[a] for a, b in self.joints])
+        self._coupling = coupling(robot.model)
         self._place()
 
     def __len__(self) -> int:
@@ -95,7 +97,7 @@ class CollisionPairs:
             points[:, NEXT_AXES] * n[:, PREVIOUS_AXES] - points[:, PREVIOUS_AXES] * n[:, NEXT_AXES]
         )
         gradients: Array = (wrenches @ kinematics.spatial_jacobian) * self._signs[pairs]
-        return gradients
+        return gradients if self._coupling is None else gradients @ self._coupling
 
     def _pair_bodies(self, bodies: list[Any], margin: float) -> None:
         model, geometry = self._robot.model, self._geometry
@@ -136,11 +138,12 @@ def _adjacent(model: Any, first: int, second: int) -> bool:
 
 
 def _moved(model: Any) -> Array:
-    """Mark the velocities that move the bodies of each joint: 1 or 0, (njoints, nv)."""
-    moved = np.zeros((model.njoints, model.nv))
+    """Mark the joints' velocities that move the bodies of each joint: 1 or 0, (njoints, n)."""
+    moved = np.zeros((model.njoints, model.nvExtended))
     for joint in range(1, model.njoints):
         for support in model.supports[joint]:
             carrier = model.joints[support]
             if support:
-                moved[joint, carrier.idx_v : carrier.idx_v + carrier.nv] = 1.0
+                first = carrier.idx_vExtended
+                moved[joint, first : first + carrier.nvExtended] = 1.0
     return moved

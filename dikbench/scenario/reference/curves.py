@@ -21,7 +21,7 @@ WORLD_XY_PLANE: Final = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
 
 def plane_of(robot: Robot) -> Array:
     """Return the plane in which a robot's curves lie, its two axes as columns (3, 2)."""
-    return WORLD_YZ_PLANE if 2 in robot.task_rows else WORLD_XY_PLANE
+    return WORLD_YZ_PLANE if 2 in robot.movable_rows else WORLD_XY_PLANE
 
 
 def circle(

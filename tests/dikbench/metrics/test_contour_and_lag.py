@@ -14,7 +14,7 @@ from scipy.optimize import minimize_scalar
 from dikbench.arrays import Array
 from dikbench.metrics import Motion, evaluate
 from dikbench.problem.tasks import OrientationTask, PoseTask
-from dikbench.robots.catalogue import load_robot
+from dikbench.robots.loading import load_robot
 from dikbench.scenario import Scenario
 from dikbench.scenario.certificate import Certificate
 from dikbench.scenario.reference.curves import circle, lemniscate

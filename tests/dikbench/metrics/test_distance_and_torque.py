@@ -14,7 +14,7 @@ from dikbench.metrics import METRICS, motion_of
 from dikbench.metrics.distance_and_torque import CONSTRAINTS
 from dikbench.problem.constraints import CollisionConstraint, Constraint, TorqueConstraint
 from dikbench.problem.tasks import PoseTask
-from dikbench.robots.catalogue import load_robot
+from dikbench.robots.loading import load_robot
 from dikbench.robots.robot import Robot, model_limits
 from dikbench.scenario import Scenario
 from dikbench.scenario.certificate import Certificate

@@ -13,7 +13,7 @@ import pytest
 from dikbench.metrics import METRICS, evaluate, motion_of
 from dikbench.metrics.distance_and_torque import CONSTRAINTS
 from dikbench.problem.tasks import PoseTask, PositionTask
-from dikbench.robots.catalogue import load_robot
+from dikbench.robots.loading import load_robot
 from dikbench.scenario import Scenario
 from dikbench.scenario.certificate import Certificate
 from dikbench.scenario.reference.reference import target_at_rest

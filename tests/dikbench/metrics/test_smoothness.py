@@ -11,7 +11,7 @@ from dikbench.arrays import Array
 from dikbench.metrics import METRICS, Motion
 from dikbench.metrics.sparc import sparc
 from dikbench.problem.tasks import PoseTask
-from dikbench.robots.catalogue import load_robot
+from dikbench.robots.loading import load_robot
 from dikbench.scenario import Scenario
 from dikbench.scenario.certificate import Certificate
 from dikbench.scenario.reference.reference import target_at_rest

@@ -14,8 +14,8 @@ from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.problem.velocity_box import Braking, velocity_box
 from dikbench.robots.braking import viable_brake
-from dikbench.robots.catalogue import load_robot
 from dikbench.robots.limits import JointLimits
+from dikbench.robots.loading import load_robot
 
 BRAKINGS = get_args(Braking)
 

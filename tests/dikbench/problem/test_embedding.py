@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from dikbench.problem.embedding import Embedding, embedding_of
 from dikbench.problem.tasks import OrientationTask, PoseTask, PositionTask
-from dikbench.robots.catalogue import load_robot
+from dikbench.robots.loading import load_robot
 
 PANDA, PLANAR = load_robot("panda"), load_robot("planar3r")
 SEEDS = st.integers(0, 2**32 - 1)

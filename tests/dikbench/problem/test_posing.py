@@ -25,7 +25,7 @@ from dikbench.problem import (
     pose_problem,
     program_of,
 )
-from dikbench.robots.catalogue import load_robot
+from dikbench.robots.loading import load_robot
 from dikbench.scenario import Scenario
 from dikbench.scenario.plant import Ideal
 from dikbench.simulation.closed_loop import simulate

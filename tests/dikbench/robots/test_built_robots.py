@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from dikbench.arrays import Array
-from dikbench.robots.catalogue import LWR_TABLE, load_robot
+from dikbench.robots.catalogue import LWR_TABLE
 from dikbench.robots.denavit_hartenberg import denavit_hartenberg_arm
 from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.loading import load_robot
 from dikbench.robots.robot import Robot
 
 

@@ -9,8 +9,8 @@ import pytest
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.robots.catalogue import load_robot
 from dikbench.robots.limits import Interval, JointLimits
+from dikbench.robots.loading import load_robot
 from dikbench.robots.robot import Robot
 
 KINDS = ("position", "velocity", "acceleration", "effort")

@@ -15,8 +15,9 @@ from hypothesis.extra.numpy import arrays
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.problem.velocity_box import velocity_box
-from dikbench.robots.catalogue import ROBOTS, load_robot
+from dikbench.robots.catalogue import ROBOTS
 from dikbench.robots.kinematics import Kinematics, smallest_singular_value
+from dikbench.robots.loading import load_robot
 from dikbench.robots.robot import Robot, frame_id, model_limits
 
 URDF = """<robot name="two">

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from dikbench.arrays import Array
-from dikbench.robots.catalogue import ROBOTS, load_robot
+from dikbench.robots.catalogue import ROBOTS
 from dikbench.robots.kinematics import Kinematics, smallest_singular_value
+from dikbench.robots.loading import load_robot
 from dikbench.robots.robot import Robot
 
 

@@ -12,8 +12,8 @@ import pytest
 from dikbench.plugins.building import make_scenario
 from dikbench.problem.tasks import PositionTask
 from dikbench.results.reading import read_results
-from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.loading import load_robot
 from dikbench.run.runner import RunSettings, run_study
 from dikbench.run.trial_row import run_trial
 from dikbench.scenario.oracle import ORACLE, follow, joint_oracle, oracle_motion, solve_placement

@@ -14,8 +14,8 @@ from hypothesis.extra.numpy import arrays
 
 from dikbench.arrays import Array, read_only
 from dikbench.plugins.building import make_scenario
-from dikbench.robots.catalogue import load_robot
 from dikbench.robots.limits import Limits
+from dikbench.robots.loading import load_robot
 from dikbench.scenario import Scenario
 from dikbench.scenario.plant import PLANTS, Ideal, Plant, Protective, Saturating
 

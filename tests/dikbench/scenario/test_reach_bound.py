@@ -12,7 +12,8 @@ from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.problem.embedding import embedding_of
 from dikbench.problem.tasks import PoseTask, PositionTask
-from dikbench.robots.catalogue import ROBOTS, load_robot
+from dikbench.robots.catalogue import ROBOTS
+from dikbench.robots.loading import load_robot
 from dikbench.robots.robot import Robot
 from dikbench.scenario import placement_of, solve_placement
 from dikbench.scenario.reach_bound import is_out_of_reach

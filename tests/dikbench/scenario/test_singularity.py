@@ -11,8 +11,8 @@ from makers.scenarios import known_singularity
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics, smallest_singular_value
+from dikbench.robots.loading import load_robot
 from dikbench.robots.robot import Robot
 from dikbench.scenario.oracle import position_margin
 from dikbench.scenario.singularity import analyse, make_singular, singular_postures

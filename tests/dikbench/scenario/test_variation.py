@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dikbench.errors import DikbenchError
-from dikbench.robots.catalogue import load_robot
+from dikbench.robots.loading import load_robot
 from dikbench.scenario.variation import NO_VARIATION, Perturbation, Variation
 
 RANGES = Variation(start=0.2, direction=0.5, timing=0.1)

@@ -26,7 +26,7 @@ from dikbench.problem import DikProblem, Solve
 from dikbench.problem.velocity_box import velocity_box
 from dikbench.programs.answer import Answer
 from dikbench.programs.quadratic_program import ProgramKind, QuadraticProgram
-from dikbench.robots.catalogue import load_robot
+from dikbench.robots.loading import load_robot
 from dikbench.scenario.reference.reference import target_at_rest
 from dikbench.simulation.closed_loop import ERROR_CHECK_PERIOD_STEPS, simulate
 from dikbench.simulation.control_step import fallback

@@ -13,7 +13,7 @@ from dikbench.arrays import Array
 from dikbench.metrics import evaluate, motion_of
 from dikbench.plugins.building import make_formulation, make_scenario
 from dikbench.problem.tasks import PositionTask
-from dikbench.robots.catalogue import load_robot
+from dikbench.robots.loading import load_robot
 from dikbench.scenario import Reference, Scenario
 from dikbench.scenario.certificate import Certificate
 from dikbench.simulation.clock import PathClock

@@ -22,8 +22,8 @@ from dikbench.arrays import Array
 from dikbench.errors import Infeasible, SolverFailed
 from dikbench.programs.modelled_program import ModelledProgram
 from dikbench.programs.quadratic_program import QuadraticProgram
-from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.loading import load_robot
 from dikbench.solvers.catalogue.back_ends import (
     BACK_ENDS,
 )

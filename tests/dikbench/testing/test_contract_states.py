@@ -7,8 +7,8 @@ import itertools
 import numpy as np
 import pytest
 
-from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics, smallest_singular_value
+from dikbench.robots.loading import load_robot
 from dikbench.testing.states import SINGULAR, State, states
 
 ALL = list(states())

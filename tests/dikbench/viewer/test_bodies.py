@@ -10,8 +10,9 @@ import pinocchio as pin
 import pytest
 
 from dikbench.report.figures.scenario_drawing import stick
-from dikbench.robots.catalogue import ROBOTS, load_robot
+from dikbench.robots.catalogue import ROBOTS
 from dikbench.robots.example_robot_data import DataModel
+from dikbench.robots.loading import load_robot
 from dikbench.viewer.visuals import bodies, capsules
 
 ARM = """<robot name="arm">

@@ -7,7 +7,7 @@ import numpy as np
 from dikbench.arrays import Array
 from dikbench.metrics import METRICS, motion_of
 from dikbench.plugins.building import make_scenario
-from dikbench.robots.catalogue import load_robot
+from dikbench.robots.loading import load_robot
 from dikbench.simulation.trace import Trace
 from dikbench.viewer.limit_use import Nearness, nearness
 

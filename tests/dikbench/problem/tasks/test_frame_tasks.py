@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.problem.tasks import OrientationTask, PositionTask
-from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.loading import load_robot
 from dikbench.robots.robot import Robot
 
 STEP = 1e-6

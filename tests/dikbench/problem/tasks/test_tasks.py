@@ -27,8 +27,8 @@ from dikbench.problem.tasks import (
     Task,
 )
 from dikbench.problem.tasks.task import stacked
-from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.loading import load_robot
 from dikbench.robots.robot import Robot
 
 STEP = 1e-6

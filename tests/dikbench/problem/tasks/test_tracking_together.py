@@ -7,8 +7,8 @@ import pinocchio as pin
 
 from dikbench.plugins.building import make_scenario
 from dikbench.problem.tasks import PoseTask, PositionTask, TrackingTogether
-from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.loading import load_robot
 from dikbench.scenario.oracle import solve_placement
 
 

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 from dikbench.arrays import Array
-from dikbench.robots.catalogue import load_robot
+from dikbench.robots.loading import load_robot
 from dikbench.scenario.reference.curves import (
     WORLD_XY_PLANE,
     WORLD_YZ_PLANE,

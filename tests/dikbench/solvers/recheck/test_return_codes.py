@@ -14,8 +14,8 @@ from dikbench.plugins.building import make_scenario
 from dikbench.problem import DikProblem, Solve
 from dikbench.programs.quadratic_program import ProgramKind, QuadraticProgram
 from dikbench.report.tables.return_codes import return_codes
-from dikbench.robots.catalogue import load_robot
 from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.loading import load_robot
 from dikbench.run.trial_row import run_trial
 from dikbench.scenario.plant import Saturating
 from dikbench.simulation.closed_loop import simulate
