@@ -155,7 +155,7 @@ def test_times_in_nanoseconds_are_refused() -> None:
 def test_an_arm_of_five_joints_follows_the_positions_of_its_own_recorded_poses() -> None:
     """Between the rows no posture of it has the orientation, which it is told of."""
     selector = (
-        f"csv[robot={DATA / 'five_dof.urdf'},frame=tool,velocity=2,"
+        f"csv[robot={DATA / 'urdf' / 'five_dof.urdf'},frame=tool,velocity=2,"
         f"file={DATA / 'poses' / 'five_dof_own_101.csv'}"
     )
     error = scenario_error(f"{selector}]")
