@@ -29,14 +29,15 @@ def through(times: Sequence[float], placements: Sequence[Any], *, smooth: bool) 
     """
     twists = [pin.log6(here.actInv(there)).np for here, there in pairwise(placements)]
     spans = np.diff(times)
+    rounding = 0.0 if smooth else SAME_INSTANT_S  # at rest there is no other velocity to take
 
     def placement(tau: float) -> Any:
-        k, u = segment_at(times, tau)
+        k, u = segment_at(times, tau, rounding)
         s = u**3 * (10 - 15 * u + 6 * u**2) if smooth else u
         return placements[k] * pin.exp6(pin.Motion(s * twists[k]))
 
     def velocity(tau: float) -> Array:
-        k, u = segment_at(times, tau)
+        k, u = segment_at(times, tau, rounding)
         rate = 30 * u**2 * (1 - u) ** 2 if smooth else 1.0
         twist: Array = rate / spans[k] * twists[k]
         return twist
@@ -60,14 +61,15 @@ def held(times: Sequence[float], placements: Sequence[Any]) -> Reference:
     return Reference(float(times[-1]), placement, lambda tau: zero)
 
 
-def segment_at(times: Sequence[float], tau: float) -> tuple[int, float]:
+def segment_at(
+    times: Sequence[float], tau: float, rounding: float = SAME_INSTANT_S
+) -> tuple[int, float]:
     """Find the segment between two times in which tau lies, and its share of the segment.
-
-    A tau that is within rounding of a time belongs to the segment that begins there.
 
     Args:
         times: increasing, at least two [s].
         tau: [s]; before the first time and after the last one it is at these.
+        rounding: a tau so little before a time belongs to the segment that begins there [s].
     """
-    k = min(max(bisect_right(times, tau + SAME_INSTANT_S) - 1, 0), len(times) - 2)
+    k = min(max(bisect_right(times, tau + rounding) - 1, 0), len(times) - 2)
     return k, min(max((tau - times[k]) / (times[k + 1] - times[k]), 0.0), 1.0)
