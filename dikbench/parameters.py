@@ -185,6 +185,13 @@ class Parameter:
         return typing.get_args(self.type) if typing.get_origin(self.type) is Literal else ()
 
     @property
+    def numeric(self) -> bool:
+        """Whether it is a number, or may be one; what may be a text too is checked by its class."""
+        union = typing.get_origin(self.type) in (Union, UnionType)
+        kinds = typing.get_args(self.type) if union else (self.type,)
+        return any(part in (int, float) for part in kinds) and str not in kinds
+
+    @property
     def hidden(self) -> bool:
         """Whether it has one value only, so that lists leave it out."""
         return len(self.choices) == 1
@@ -257,20 +264,15 @@ def _read(plugin: type, field: dataclasses.Field[Any]) -> Parameter:
     else:
         number: dict[type, Any] = {bool: bool, int: int | float, float: float}
         kind = number.get(type(default), str)
-    numeric = any(part in (int, float) for part in (kind, *typing.get_args(kind)))
-    parameter = Parameter(
-        field.name,
-        kind,
-        default,
-        _marker(hints, Range) if numeric else None,
-        _marker(hints, Drawn),
-    )
+    parameter = Parameter(field.name, kind, default, None, _marker(hints, Drawn))
+    if parameter.numeric:
+        parameter = dataclasses.replace(parameter, range=_marker(hints, Range))
     problem = "its default"
     try:
         if not parameter.required:
             parameter.check(default)
         problem = "Drawn:"
-        if parameter.drawn is not None and numeric:
+        if parameter.drawn is not None and parameter.numeric:
             for bound in (parameter.drawn.low, parameter.drawn.high):
                 parameter.check(bound)
     except DikbenchError as error:

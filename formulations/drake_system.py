@@ -100,5 +100,10 @@ def scaled_bounds(limits: Limits) -> tuple[Array, Array]:
     nearer = limits.to_lower < limits.to_upper
     distance = np.minimum(limits.to_lower, limits.to_upper)
     scale = np.clip((distance - STOP_RAD) / (INFLUENCE_RAD - STOP_RAD), 0.0, 1.0)
-    lower = np.where(nearer, scale * velocity.lower, velocity.lower)
-    return lower, np.where(nearer, velocity.upper, scale * velocity.upper)
+    lower = np.where(nearer, _scaled(velocity.lower, scale), velocity.lower)
+    return lower, np.where(nearer, velocity.upper, _scaled(velocity.upper, scale))
+
+
+def _scaled(bound: Array, scale: Array) -> Array:
+    """Multiply a bound (nv,), infinite or not, by a share (nv,); nothing of infinity is nothing."""
+    return np.multiply(bound, scale, out=np.zeros_like(bound), where=scale > 0)

@@ -21,8 +21,17 @@ from dikbench.problem import (
     QuadraticProgram,
     Range,
     Solve,
+    rank,
+    thin_svd,
 )
 from formulations.lp_alpha import regularization_for
+
+DEPENDENT_SHARE = 1e-12
+"""Share of the largest singular value of J up to which one is zero but for rounding."""
+
+SLACK = 1e-6
+"""Where J is singular alpha may be negative by this: else its bounds contradict its equations up to
+rounding, and solvers that are asked for many digits find nothing."""
 
 SMALLEST_COS_PITCH = 1e-3
 """|cos(pitch)| below which the rates of roll and yaw are not defined."""
@@ -39,7 +48,7 @@ class LpAlphaComponents(Parameters):
     maps the rates of x, y, z, roll, pitch, yaw of the task frame in the world (R = Rz(yaw)
     Ry(pitch) Rx(roll)) to its body twist, so that a teleoperator who meets a limit along one axis
     keeps the others: direction errors are intended, and depend on the axes. lo and hi are the
-    velocity box. Ignores weights.
+    velocity box. Where J is singular, alpha_i >= -1e-6. Ignores weights.
 
     Attributes:
         regularization: rho; None: 1e-4 if the arm has more joints than the task has rows, else 0.
@@ -80,11 +89,30 @@ class LpAlphaComponents(Parameters):
         P = np.zeros((n + m, n + m))
         P[:n, :n].flat[:: n + 1] = regularization_for(task, self.regularization)
         q = np.concatenate([np.zeros(n), -np.ones(m)])
-        A = np.hstack([task.J, -E * np.linalg.solve(E, task.V)])
+        A, kept = _apart(np.hstack([task.J, -E * np.linalg.solve(E, task.V)]), n)
+        slack = 0.0 if kept == m else SLACK
         box = problem.box(self.braking)
-        lower = np.concatenate([box.lower, np.zeros(m)])
+        lower = np.concatenate([box.lower, np.full(m, -slack)])
         upper = np.concatenate([box.upper, np.ones(m)])
         return solve(QuadraticProgram(P, q, A=A, b=np.zeros(m), lb=lower, ub=upper))[:n]
+
+
+def _apart(A: Array, n: int) -> tuple[Array, int]:
+    """Turn the rows of A (m, n + m) so that a singular J, its first n columns, has rows of zeros.
+
+    The equations A x = 0 stay the same. As they are, rows that depend on each other up to rounding
+    make active-set solvers cycle.
+
+    Returns:
+        The rows, and the rank of J.
+    """
+    U, singular, _ = thin_svd(A[:, :n])
+    kept = rank(singular, DEPENDENT_SHARE * singular[0])
+    if kept == len(A):
+        return A, kept
+    turned: Array = U.T @ A
+    turned[kept:, :n] = 0.0
+    return turned, kept
 
 
 def _rows(problem: DikProblem, rows: tuple[int, ...]) -> list[int]:

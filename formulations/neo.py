@@ -20,7 +20,12 @@ from dikbench.problem import (
     Range,
     Solve,
 )
-from formulations.manipulability import manipulability_gradient
+from formulations.manipulability import (
+    columns_before,
+    joint_without_gradient,
+    manipulability_gradient,
+    tracks_whole_pose,
+)
 
 LARGEST_SLACK = 10.0
 """Largest slack of each row of the task [m/s; rad/s]."""
@@ -41,8 +46,7 @@ class Neo(Parameters):
     in rad/s; J_m the gradient of the manipulability sqrt det(J J^T), (nv,); rho_i the distance to
     the position limit ahead [rad], and likewise below. The price of the slack rises as the error
     falls: the arm first improves its posture and then moves to the target, with direction errors.
-    For arms of joints with one degree of freedom each; without the reward where the task is not a
-    whole pose. Ignores weights.
+    Without the reward where the first priority is not one whole pose. Ignores weights.
 
     Attributes:
         velocity_weight: lambda_v.
@@ -69,6 +73,20 @@ class Neo(Parameters):
         if near >= far:
             raise DikbenchError(f"stop_distance={near} must be below influence_distance={far}")
 
+    def refuses(self, problem: DikProblem) -> str:
+        """Whether the gradient of the manipulability is wanted, and not known."""
+        joint = joint_without_gradient(problem.robot) if self._rewards(problem) else ""
+        if not joint:
+            return ""
+        return f"the axes of joint {joint!r} move, valid is: manipulability_gain=0"
+
+    def _rewards(self, problem: DikProblem) -> bool:
+        """Say whether the first priority is one whole pose, and its manipulability rewarded."""
+        first = [task for task in problem.tasks if task.priority == problem.tasks[0].priority]
+        robot = problem.robot
+        whole = len(first) == 1 and len(first[0].V) == len(robot.task_rows)
+        return self.manipulability_gain > 0 and whole and tracks_whole_pose(robot)
+
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
         task = problem.primary
@@ -78,8 +96,9 @@ class Neo(Parameters):
         scale = min(1.0, 1 / price)
         P = np.diag(scale * np.concatenate([np.full(n, self.velocity_weight), np.full(m, price)]))
         q = np.zeros(n + m)
-        if self.manipulability_gain and m == len(problem.robot.task_rows):
-            q[:n] = -scale * self.manipulability_gain * manipulability_gradient(task.J)
+        if self._rewards(problem):
+            gradient = manipulability_gradient(task.J, columns_before(problem.robot))
+            q[:n] = -scale * self.manipulability_gain * gradient
         lower, upper = self._bounds(problem.limits)
         slack = np.full(m, LARGEST_SLACK)
         A = np.hstack([task.J, np.eye(m)])

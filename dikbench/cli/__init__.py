@@ -288,7 +288,7 @@ def show(name: str, figure: Path | None) -> None:
 
     Parameters may stand in brackets. A scenario's selector prints its certificate as well.
     """
-    from dikbench.cli.listing import description
+    from dikbench.cli.describing import description
 
     text = description(name)
     if figure is not None:

@@ -71,10 +71,10 @@ def _of_study(benchmark: str, out: Path | None, jobs: int | None) -> Iterator[Li
     from dikbench.invariants import check_benchmark
     from dikbench.run.pool import available_cores
     from dikbench.run.runner import RunSettings
-    from dikbench.study.study import load_study
+    from dikbench.study.study import CHECKED, load_study
 
     study = load_study(benchmark)
-    folder = out or Path("runs") / f"check-{study.name}"
+    folder = out or Path("runs") / f"{CHECKED}{study.name}"
     settings = RunSettings(jobs=jobs or available_cores(), traces="none")
     command = shlex.join(["dikbench", *sys.argv[1:]])
     for checked in check_benchmark(study, folder, settings, command):
@@ -107,5 +107,11 @@ def _of_plugin(name: str, solver: str | None) -> Iterator[Line]:
         raise DikbenchError(f"--solver {solver}: {name} is a scenario family, which needs none")
     else:
         verdicts = verdicts_on_family(make_family(name))
+    unchecked: dict[str, list[str]] = {}
     for verdict in verdicts:
-        yield verdict.outcome, verdict.check, verdict.reason
+        if verdict.outcome == "not checked":
+            unchecked.setdefault(verdict.reason, []).append(verdict.check)
+        else:
+            yield verdict.outcome, verdict.check, verdict.reason
+    for reason, checks in unchecked.items():
+        yield "not checked", ", ".join(checks), reason

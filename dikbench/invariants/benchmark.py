@@ -12,7 +12,7 @@ from dikbench.invariants.of_rows import INVARIANTS
 from dikbench.results.reading import read_results, without_attributes
 from dikbench.run.runner import RunSettings, run_study
 from dikbench.scenario.oracle import ORACLES
-from dikbench.study.study import Cells, Study
+from dikbench.study.study import CHECKED, Cells, Study
 from dikbench.testing import straw
 
 
@@ -25,14 +25,15 @@ class Checked:
 
 
 def with_straw_laws(study: Study) -> Study:
-    """Return the study with the straw laws and the oracles as further formulations.
+    """Return the study with the straw laws and the oracles as further formulations, renamed.
 
     Whatever its split, since nothing is concluded from it.
     """
     file = Path(straw.__file__)
     laws = tuple(f"{file}:{law.__name__}" for law in straw.STRAW_LAWS)
     cells = (*study.cells, Cells((*ORACLES, *laws)))
-    return msgspec.structs.replace(study, cells=cells, timing=None, split="")
+    name = f"{CHECKED}{study.name}"
+    return msgspec.structs.replace(study, name=name, cells=cells, timing=None, split="")
 
 
 def check_benchmark(

@@ -54,8 +54,8 @@ OUTCOME_SENTENCES: Final[Mapping[Outcome, str]] = MappingProxyType(
         Outcome.LATE: "behind the clock by more than 0.1 s and 5 % of the nominal duration",
         Outcome.NOT_RECOVERED: "where nothing can follow the clock: not back at the end, or away "
         "by more than 10 tolerances or a quarter of the path's extent",
-        Outcome.CHATTERING: "a joint's velocity jumps back within 2 steps in more than 5 % of the "
-        "steps",
+        Outcome.CHATTERING: "a joint's velocity jumps back within 2 steps, or shakes at 10 Hz or "
+        "more by over 1 % of its limit, in more than 5 % of the steps",
         Outcome.SUCCESS: "the robot did its job",
         Outcome.RECOVERED: "nothing can follow the clock here; the robot gave way and came back",
     }
@@ -141,7 +141,7 @@ class Judgement:
 
     def _not_recovered(self, tolerance: float) -> Iterator[Verdict]:
         """What keeps a robot from having given way and come back, where nothing could follow."""
-        bound = min(RECOVERY_TOLERANCES * tolerance, RECOVERY_SHARE * self.extent)
+        bound = self.recovery_bound(tolerance)
         cut = "tolerance [m] at which 99% of the path are done"
         for step, figure, most, reason in (
             (self.end.step, self.end.figure, tolerance, self.end.reason),
@@ -150,6 +150,10 @@ class Judgement:
         ):
             if not figure <= most:
                 yield Verdict(Outcome.NOT_RECOVERED, step, figure, reason)
+
+    def recovery_bound(self, tolerance: float) -> float:
+        """Return how far [m] who recovers may be off the path, and the cut, at a tolerance [m]."""
+        return min(RECOVERY_TOLERANCES * tolerance, RECOVERY_SHARE * self.extent)
 
     def columns(self, tolerance: float) -> dict[str, Any]:
         """Return what a row of results keeps: the outcome at a tolerance [m], and all of `at`."""

@@ -15,6 +15,7 @@ from dikbench.plugins.time_limit import time_limit
 from dikbench.problem.problem import Formulation
 from dikbench.scenario.certificate import CertificateFailed
 from dikbench.scenario.family import Family
+from dikbench.scenario.misfits import misfits
 from dikbench.scenario.plant import PLANTS, Plant
 from dikbench.scenario.scenario import Scenario
 from dikbench.selector import Selector, parse_selector
@@ -52,22 +53,28 @@ def make_family(text: str | Selector) -> Family:
 
 
 def make_scenario(text: str | Selector, seed: int = 0) -> Scenario:
-    """Build the scenario of a selector and a seed, and check its certificate.
+    """Build the scenario of a selector and a seed, and check its certificate and its parts.
 
     Raises:
-        DikbenchError: on an unknown family or parameter, or a value out of range.
+        DikbenchError: on an unknown family or parameter, a value out of range, a number without a
+            range, or parts that do not fit together.
         CertificateFailed: if a claim of its certificate does not hold.
     """
     family = make_family(text)
     try:
+        _check_ranges(family)
         with time_limit(LONGEST_BUILDING_S, "its building"):
-            return family.scenario(seed)
+            made = family.scenario(seed)
+        wrong = next(misfits(made), "")
     except CertificateFailed as error:
         raise CertificateFailed(str(text), error.failures) from None
     except MemoryError:
         raise
     except Exception as error:
         raise DikbenchError(f"scenario {text}: {_reason(error)}") from error
+    if wrong:
+        raise DikbenchError(f"scenario {text}: {wrong}")
+    return made
 
 
 def make_plant(text: str | Selector) -> Plant:
@@ -87,11 +94,26 @@ def scenario_parameters(text: str | Selector) -> Mapping[str, Any]:
     """Return the parameters of a scenario's selector with their values, defaults included.
 
     Raises:
-        DikbenchError: on an unknown family or parameter, or a value of the wrong type or out of
-            range.
+        DikbenchError: on an unknown family or parameter, a value of the wrong type or out of
+            range, or a number without a range.
     """
     family = make_family(text)
+    _check_ranges(family)
     return {name: getattr(family, name) for name in parameters_of(type(family))}
+
+
+def _check_ranges(family: Family) -> None:
+    """Check that nothing leaves a number of a family open: rows of an infinite one say nothing.
+
+    Raises:
+        DikbenchError: if a number has no range.
+    """
+    for name, parameter in parameters_of(type(family)).items():
+        if parameter.numeric and parameter.range is None:
+            raise DikbenchError(
+                f"class {type(family).__name__}: {name} is a number without a Range; valid: "
+                f"{name}: Annotated[float, Range(0.0, 1.0)]"
+            )
 
 
 def in_declared_order(
@@ -125,7 +147,10 @@ def _built(
     values = _values(what, parameters, selector)
     for name, parameter in parameters.items():
         if parameter.required and name not in values:
-            raise DikbenchError(f"{what}: parameter {name!r} must be given")
+            raise DikbenchError(
+                f"{what}: parameter {name!r} must be given; valid: "
+                f"{selector.name}[{name}=...], {parameter.valid}"
+            )
     try:
         made = make(**values)
         check_parameters(made)

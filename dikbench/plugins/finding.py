@@ -79,7 +79,7 @@ def plugins(kind: Kind) -> Mapping[str, Plugin]:
     for entry_point in importlib.metadata.entry_points(group=group):
         where = f"plug-in {entry_point.name!r} of {group}"
         try:
-            module = entry_point.load()
+            module = _loaded(entry_point)
         except Exception as error:
             raise DikbenchError(
                 f"{where} ({entry_point.value}) cannot be imported: {in_words(error)}"
@@ -87,7 +87,11 @@ def plugins(kind: Kind) -> Mapping[str, Plugin]:
         file = getattr(module, "__file__", None) or repr(module)
         table = getattr(module, f"{kind.upper()}S", None)
         if not isinstance(table, Mapping):
-            raise DikbenchError(f"{where}: {file} holds no mapping {kind.upper()}S")
+            top = entry_point.value.partition(".")[0]
+            raise DikbenchError(
+                f"{where}: {file} holds no mapping {kind.upper()}S; if it is not the plug-in's, a "
+                f"folder or module {top!r} of yours hides it: valid: another name"
+            )
         for name, entry in table.items():
             plugin = _registered(kind, name, entry, file)
             if found.setdefault(plugin.name, plugin) != plugin:
@@ -100,6 +104,19 @@ def plugins(kind: Kind) -> Mapping[str, Plugin]:
             "run pip install -e . in its checkout"
         )
     return found
+
+
+def _loaded(entry_point: importlib.metadata.EntryPoint) -> Any:
+    """Load what an entry point names; what is installed beside dikbench comes first.
+
+    A folder `formulations` or `scenarios` beside a user's script would hide those of dikbench.
+    """
+    beside = str(Path(__file__).parents[2])
+    sys.path.insert(0, beside)
+    try:
+        return entry_point.load()
+    finally:
+        sys.path.remove(beside)
 
 
 def formulation_plugin(name: str) -> Plugin:

@@ -56,7 +56,12 @@ class DikProblem(msgspec.Struct, eq=False):
     _levels: tuple[LinearizedTask, ...] | None = None
 
     def __post_init__(self) -> None:
-        """Sort the tasks. Most are sorted already, one per priority: then they are the levels."""
+        """Check q; sort the tasks. Most are sorted, one per priority: then they are the levels.
+
+        Raises:
+            DikbenchError: if a (cos, sin) or a quaternion in q has not norm 1.
+        """
+        self.robot.check_norms(self.q, "q")
         self.tasks = self._levels = tasks = tuple(self.tasks)
         for first, second in pairwise(tasks):
             if first.priority >= second.priority:
@@ -137,7 +142,15 @@ def sight_of(formulation: Formulation) -> frozenset[ProblemPart]:
 
 
 def refusal_of(formulation: Formulation, problem: DikProblem) -> str:
-    """Why the formulation cannot answer problems of this kind; empty where it can."""
+    """Why the formulation cannot answer problems of this kind; empty where it can.
+
+    It is its own reason, or that it does not look at the rows G v <= h of the problem.
+    """
+    if sees_constraints(formulation, problem) is False:
+        return (
+            "does not look at constraints (rows G v <= h, of distances and torques); leave them "
+            "out, or take a formulation that sees 'inequalities'"
+        )
     refuses: Callable[[DikProblem], str] | None = getattr(formulation, "refuses", None)
     return "" if refuses is None else refuses(problem)
 

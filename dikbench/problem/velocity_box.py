@@ -17,7 +17,8 @@ Without acceleration limits `sqrt` and `viable` are the same as `one-step`.
 Where the bounds contradict each other, position limits take precedence over velocity limits and
 those over acceleration limits; joints whose acceleration bound was given up are counted. Outside a
 position limit the bound leads back inside: hi = max(d/dt, -v_back), v_back a tenth of the velocity
-limit.
+limit, or, where acceleration limits are in force, as fast as they allow: hi = max(d/dt, -v_back,
+min(0, v_prev - a dt)).
 """
 
 from __future__ import annotations
@@ -97,9 +98,14 @@ def velocity_box(
         lower, upper = inside.box.lower, inside.box.upper
     if joint.acceleration is None or v_prev is None:
         return Box(lower, upper, 0)
-    return _with_acceleration(
-        lower, upper, v_prev + joint.acceleration.lower * dt, v_prev + joint.acceleration.upper * dt
-    )
+    slowest = v_prev + joint.acceleration.lower * dt
+    fastest = v_prev + joint.acceleration.upper * dt
+    to_lower, to_upper = limits.to_lower, limits.to_upper
+    if to_lower is not None and to_upper is not None:
+        # Outside, a joint may not move farther out, and is asked back no faster than it can.
+        upper = np.where(to_upper < 0, np.maximum(upper, np.minimum(slowest, 0)), upper)
+        lower = np.where(to_lower < 0, np.minimum(lower, np.maximum(fastest, 0)), lower)
+    return _with_acceleration(lower, upper, slowest, fastest)
 
 
 def _without_acceleration(

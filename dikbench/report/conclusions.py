@@ -20,6 +20,7 @@ def conclusions(trials: pd.DataFrame) -> list[str]:
     for chapter in summary.chapters:
         lines += [f"{chapter.situation}: {each.question}: {each.text}" for each in chapter.findings]
     for block in table.blocks:
+        lines += [f"{block.setting}: {block.note}"] if block.note else []
         for row in block.rows:
             lines += [
                 f"star: {block.setting}: {column.heading}: {row.formulation} {row.solver}"

@@ -15,6 +15,9 @@ from dikbench.robots.robot import Robot
 class Kinematics:
     """The robot at one configuration: placements and Jacobians of its frames.
 
+    Memory of its own takes as long to make as five updates; `robot.scratch` serves where nothing
+    else uses it until the last result is read.
+
     Attributes:
         robot: the robot.
         q: the configuration of the last update, shape (nq,).
@@ -22,10 +25,10 @@ class Kinematics:
 
     __slots__ = ("_data", "_model", "q", "robot")
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, data: Any = None) -> None:
         self.robot = robot
         self._model = robot.model
-        self._data = robot.model.createData()
+        self._data = robot.model.createData() if data is None else data
         self.q: Array = robot.q0
 
     def update(self, q: Array) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.arrays import Array
-from dikbench.errors import DikbenchError, unknown
+from dikbench.errors import LONGEST_CHARACTERS, NEAREST_NAMES, DikbenchError, unknown
 from dikbench.robots.catalogue import ROBOTS
 from dikbench.robots.example_robot_data import DataModel, data_file, urdf_visuals
 from dikbench.robots.kinematics import Kinematics
@@ -164,8 +164,12 @@ def _from_urdf(path: str, frame: str | None, root: Root) -> Robot:
     """Load a URDF; its start is the neutral configuration, moved inside the limits."""
     model, following = urdf_model(path, root)
     if frame is None:
-        frames = ", ".join(f.name for f in model.frames if f.name != "universe")
-        raise DikbenchError(f"robot file {path}: name its task frame; valid: {frames}")
+        frames = [f.name for f in model.frames if f.name != "universe"]
+        listed = ", ".join(frames)
+        if len(listed) > LONGEST_CHARACTERS:
+            some = ", ".join(frames[-NEAREST_NAMES:])
+            listed = f"{some}, ... ({len(frames)} in all, listed by `dikbench show {path}`)"
+        raise DikbenchError(f"robot file {path}: name its task frame; valid: {listed}")
     limits = with_followers(model_limits(model), model, following, path)
     limits = limits.with_interval("effort", None)
     visuals = partial(urdf_visuals, model, path, Path(path).absolute().parent)
@@ -271,6 +275,6 @@ def _check_ranges(robot: Robot) -> None:
         )
         raise DikbenchError(
             f"robot {robot.name}: joint {model.names[joint]!r} cannot move: its position limits "
-            f"are {position.lower[stuck[0]]:g} and {position.upper[stuck[0]]:g} (0 where a URDF "
+            f"are both {position.lower[stuck[0]] + 0.0:g} (0 where a URDF "
             f"has none); give it limits, or lock it: lock={model.names[joint]}"
         )

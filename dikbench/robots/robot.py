@@ -17,6 +17,12 @@ from dikbench.robots.task_rows import ALL_ROWS, Axes
 
 UNCHANGED: Final[Any] = object()
 
+UNIT_NORM_TOLERANCE: Final = 1e-3
+"""Largest error of the norm of (cos, sin) or a quaternion, which comes from rounded digits."""
+
+UNIT_NORM_ROUNDING: Final = 1e-9
+"""A smaller error of such a norm is the rounding of a computation."""
+
 
 @dataclass(frozen=True, eq=False)
 class Robot:
@@ -54,8 +60,8 @@ class Robot:
     srdf: str | None = None
 
     def __post_init__(self) -> None:
-        """Copy the start and make it read-only: all trials share it."""
-        start = np.array(self.q0, dtype=float)
+        """Check and copy the start and make it read-only: all trials share it."""
+        start = self.configuration(self.q0, f"robot {self.name}: start")
         start.flags.writeable = False
         object.__setattr__(self, "q0", start)
 
@@ -74,7 +80,7 @@ class Robot:
 
     @cached_property
     def scratch(self) -> Any:
-        """A `pinocchio.Data` for formulations that need more than the task Jacobian."""
+        """A `pinocchio.Data` for whoever reads its results before calling anything else."""
         return self.model.createData()
 
     @cached_property
@@ -168,12 +174,39 @@ class Robot:
         return replace(self, limits=limits)
 
     def configuration(self, q: object, what: str = "q") -> Array:
-        """Check a configuration that came from outside and return it as an array (nq,).
+        """Check a configuration that came from outside and return it as a new array (nq,).
+
+        The (cos, sin) of continuous joints and quaternions are brought to norm 1 from rounded
+        digits.
 
         Raises:
-            DikbenchError: on a wrong shape, NaN or infinity.
+            DikbenchError: on a wrong shape, NaN or infinity, or a norm that is not 1.
         """
-        return checked_vector(q, self.nq, what)
+        vector = checked_vector(q, self.nq, what)
+        self.check_norms(vector, what)
+        if not pin.isNormalized(self.model, vector, UNIT_NORM_ROUNDING):
+            vector = pin.normalize(self.model, vector)
+        return vector
+
+    def check_norms(self, q: Array, what: str) -> None:
+        """Check that (cos, sin) and quaternions in finite coordinates (nq,) have norm 1.
+
+        Raises:
+            DikbenchError: if one has not, and names its joint.
+        """
+        model = self.model
+        if self.nq == self.nv or pin.isNormalized(model, q, UNIT_NORM_TOLERANCE):
+            return
+        if not np.isfinite(q).all():
+            return
+        for name, joint in zip(model.names, model.joints, strict=True):
+            alone, own = pin.neutral(model), slice(joint.idx_q, joint.idx_q + joint.nq)
+            alone[own] = q[own]
+            if not pin.isNormalized(model, alone, UNIT_NORM_TOLERANCE):
+                raise DikbenchError(
+                    f"{what}: the coordinates of joint {name!r} hold a (cos, sin) or a quaternion, "
+                    f"whose norm must be 1, got {q[own].tolist()}"
+                )
 
 
 def frame_id(model: Any, frame: str) -> int:

@@ -18,15 +18,20 @@ POSTURES: Final = 64
 SPREAD: Final = 0.6
 """Share of the half ranges about their middles in which they are drawn."""
 
+SAFE_MARGIN_RAD: Final = 0.5
+"""A posture this far from all limits (see `Robot.joint_scale`) is no better farther away."""
+
 HALF_TURN: Final = pi
 """A range that is longer than two of these, or has no end, is cut to as much on each side of its
 point nearest to zero [rad or m]."""
 
 
 def safe_start(robot: Robot) -> Array:
-    """Choose the posture (nq,) with the largest smallest singular value of the task Jacobian.
+    """Choose a well-conditioned posture (nq,) away from the limits, of 64 seeded ones.
 
-    Of 64 seeded postures inside the limits. Joints that do not move the task frame are in the
+    It has the largest smallest singular value of the task Jacobian, its
+    columns per `Robot.joint_scale`, times the smallest distance to
+    a limit where that is below `SAFE_MARGIN_RAD`. Joints that do not move the task frame are in the
     middle of their ranges.
     """
     model, limits = robot.model, robot.limits
@@ -41,7 +46,7 @@ def safe_start(robot: Robot) -> Array:
     neutral, kinematics = pin.neutral(model), Kinematics(robot)
     limited = np.isfinite(limits.position.upper) & (limits.q_index >= 0)
     random = np.random.default_rng(0)
-    best, best_sigma = neutral, -1.0
+    best, most = neutral, -1.0
     for sample in range(POSTURES):
         spread = 0.0 if sample == 0 else SPREAD
         x = middle + spread * moving * half * random.uniform(-1, 1, model.nv)
@@ -49,8 +54,14 @@ def safe_start(robot: Robot) -> Array:
         q[limits.q_index[limited]] = x[limited]
         q = robot.inside(q)
         kinematics.update(q)
-        sigma = smallest_singular_value(kinematics.task_jacobian()[:, robot.chain])
-        if sigma > best_sigma:
-            best, best_sigma = q, sigma
+        at = limits.at(q)
+        assert at.to_lower is not None
+        assert at.to_upper is not None
+        margin = (np.minimum(at.to_lower, at.to_upper) / robot.joint_scale)[robot.chain].min()
+        J = kinematics.task_jacobian() * robot.joint_scale
+        sigma = smallest_singular_value(J[:, robot.chain])
+        merit = sigma * min(float(margin) / SAFE_MARGIN_RAD, 1.0)
+        if merit > most:
+            best, most = q, merit
     start: Array = best
     return start

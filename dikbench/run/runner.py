@@ -17,6 +17,7 @@ from pebble import ProcessExpired
 from dikbench.errors import DikbenchError, unknown
 from dikbench.results.folder import ResultsFolder
 from dikbench.results.store import Store
+from dikbench.run.folder_of_study import store_for
 from dikbench.run.pool import THREAD_VARIABLES, end_group, workers
 from dikbench.run.progress_display import ProgressDisplay
 from dikbench.run.provenance import environment, git_commit, manifest
@@ -87,7 +88,7 @@ def run_study(study: Study, out: Path, settings: RunSettings, command: str) -> R
     planned = expand(study)
     _check_rerun(settings.rerun, planned)
     folder = ResultsFolder(out)
-    with folder.lock(), Store(folder.database) as store:
+    with store_for(folder, study) as store:
         commit = git_commit()
         own = environment(commit, command)
         # What a worker of this run would say of itself, for rows of workers that died.
@@ -142,7 +143,7 @@ def time_study(study: Study, out: Path, command: str) -> ResultsFolder:
         raise DikbenchError(f"study {study.name} has no section [timing]: add one to take times")
     planned = expand(study)
     folder = ResultsFolder(out)
-    with folder.lock(), Store(folder.database) as store:
+    with store_for(folder, study) as store:
         described = environment(git_commit(), command)
         run = store.begin_run(manifest(study, len(planned), described), planned)
         try:

@@ -124,6 +124,7 @@ def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "al
     """
     try:
         scenario = scenario_of(trial.scenario, trial.seed)
+        problem = first_problem(scenario)
     except DikbenchError as error:
         return row_without_run(trial, Status.SKIPPED, str(error))
     if trial.reference == "path" and not scenario.reference.moving:
@@ -138,10 +139,13 @@ def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "al
     if formulation is None:
         reason = "no joint motion is known that does what the scenario asks for"
         return row_without_run(trial, Status.SKIPPED, reason)
-    problem = first_problem(scenario)
-    reason = refusal_of(formulation, problem)
+    reason = "" if oracle else refusal_of(formulation, problem)
+    sight = {
+        "sees_constraints": None if oracle else sees_constraints(formulation, problem),
+        "sees_lower_tasks": None if oracle else sees_lower_tasks(formulation, problem),
+    }
     if reason:
-        return row_without_run(trial, Status.SKIPPED, reason)
+        return {**row_without_run(trial, Status.SKIPPED, reason), **sight}
     plant = make_plant(trial.plant)
     mode: ReferenceMode = "path" if trial.reference == "path" else "time"
     start = perf_counter()
@@ -168,8 +172,7 @@ def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "al
         **row_without_run(trial, run.status, run.message),
         "steps": run.trace.steps,
         **metrics,
-        "sees_constraints": None if oracle else sees_constraints(formulation, problem),
-        "sees_lower_tasks": None if oracle else sees_lower_tasks(formulation, problem),
+        **sight,
         "wall_time_s": perf_counter() - start,
         "control_time_s": (run.kinematics_ns + run.formulation_ns) / 1e9,
     }

@@ -88,7 +88,7 @@ def start_velocity(
 
 def placement_of(robot: Robot, q: Array) -> pin.SE3:
     """Compute the placement of the task frame at a configuration (nq,)."""
-    kinematics = Kinematics(robot)
+    kinematics = Kinematics(robot, robot.scratch)
     kinematics.update(q)
     return kinematics.placement(robot.frame_id).copy()
 

@@ -12,7 +12,7 @@ import pinocchio as pin
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.problem.tasks import PoseTask, TrackingTask
-from dikbench.robots.kinematics import Kinematics, smallest_singular_value
+from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.robot import Robot
 from dikbench.scenario.reference.reference import Reference
 
@@ -82,19 +82,22 @@ def solve_placement(
     Raises:
         DikbenchError: if the residual (m, rad) does not fall below 1e-9.
     """
-    kinematics = Kinematics(robot)
+    kinematics, step = Kinematics(robot, robot.scratch), np.zeros(robot.nv)
     q = seed
     error = np.inf
     for _ in range(iterations):
         kinematics.update(q)
         task = tracking.linearize(kinematics, target)
-        e, J = task.error, task.J * robot.joint_scale
+        e, J = task.error, task.J
+        moving = J.any(axis=0)  # a few joints of a humanoid's hundred
+        scale = robot.joint_scale[moving]
+        J = (J if moving.all() else J[:, moving]) * scale
         before, error = error, float(np.linalg.norm(e))
         if error < 1e-12 or (error < 1e-9 and error >= before):
             return q  # there, up to rounding
         H = J.T @ J
         H.flat[:: len(H) + 1] += 0.1 * error**2 + 1e-12
-        step = robot.joint_scale * np.linalg.solve(H, J.T @ e)
+        step[moving] = scale * np.linalg.solve(H, J.T @ e)
         largest = float(np.abs(step).max())
         q = pin.integrate(robot.model, q, step * min(1.0, 0.3 / max(largest, 1e-300)))
     raise DikbenchError(
@@ -158,16 +161,16 @@ def measure_motion(
         [pin.difference(model, q[k], q[k + 1]) / period for k, period in enumerate(periods)]
     ).reshape(len(periods), robot.nv)
     kinematics = Kinematics(robot)
-    sigma, margin, reach = [], [], []
-    for sample in q:
+    jacobians, reach = np.empty((len(q), len(rows), robot.nv)), []
+    for k, sample in enumerate(q):
         kinematics.update(sample)
-        sigma.append(smallest_singular_value(kinematics.task_jacobian(rows)))
-        margin.append(position_margin(robot, sample))
+        jacobians[k] = kinematics.task_jacobian(rows)
         reach.append(robot.reach_of(kinematics.placement(robot.frame_id)))
+    sigma = np.linalg.svd(jacobians, compute_uv=False)[:, -1].astype(np.float64, copy=False)
     limit = robot.limits.velocity
     ratio = np.zeros(len(v)) if limit is None else limit.usage(v).max(axis=1)
     return OracleMotion(
-        instants, q, v, np.array(sigma), ratio, np.array(margin), np.array(reach), exact
+        instants, q, v, sigma, ratio, _position_margins(robot, q), np.array(reach), exact
     )
 
 
@@ -177,8 +180,16 @@ def position_margin(robot: Robot, q: Array) -> float:
     A sliding joint counts by its share of its range, 2 pi for all of it (`Robot.joint_scale`); one
     that does not move the task frame counts where it is outside.
     """
-    limits = robot.limits.at(q)
-    if limits.to_lower is None or limits.to_upper is None:
-        return float("inf")
-    margins = np.minimum(limits.to_lower, limits.to_upper) / robot.joint_scale
-    return float(min(margins[robot.chain].min(), margins.min() if margins.min() < 0 else np.inf))
+    return float(_position_margins(robot, q[None])[0])
+
+
+def _position_margins(robot: Robot, q: Array) -> Array:
+    """Compute `position_margin` of each of several configurations (k, nq), (k,)."""
+    position = robot.limits.position
+    if position is None:
+        return np.full(len(q), np.inf)
+    values = q[:, robot.limits.q_index]
+    inside = np.minimum(values - position.lower, position.upper - values) / robot.joint_scale
+    worst, margins = inside.min(axis=1), inside[:, robot.chain].min(axis=1)
+    smallest: Array = np.where(worst < 0, worst, margins)
+    return smallest

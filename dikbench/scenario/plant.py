@@ -61,11 +61,12 @@ class Plant(Parameters, ABC):
     delay: Annotated[int, Range(0, LONGEST_DELAY_STEPS, "steps")] = 0
 
     @abstractmethod
-    def drive(self, v: Array, limits: Limits, dt: float) -> Array:
+    def drive(self, v: Array, v_before: Array, limits: Limits, dt: float) -> Array:
         """Compute the velocity that is applied of a command that arrived.
 
         Args:
             v: the command, (nv,) [rad/s or m/s], read-only.
+            v_before: the velocity that was applied before, (nv,) [rad/s or m/s], read-only.
             limits: the limits in force, as seen from the true configuration.
             dt: control period [s].
         """
@@ -83,7 +84,8 @@ class StartedPlant:
     """A plant in one trial: its random numbers and the commands that have not arrived."""
 
     __slots__ = (
-        "_arriving", "_drive", "_dt", "_model", "_noise", "_random", "_scenario", "_watch",
+        "_applied", "_arriving", "_drive", "_dt", "_model", "_noise", "_random", "_scenario",
+        "_watch",
     )  # fmt: skip
 
     def __init__(self, plant: Plant, scenario: Scenario, seed: int) -> None:
@@ -91,7 +93,8 @@ class StartedPlant:
         self._scenario = scenario
         self._model, self._dt = scenario.robot.model, scenario.dt
         self._random = np.random.default_rng([seed, NOISE_STREAM])
-        self._arriving = deque([read_only(scenario.v0.copy())] * plant.delay)
+        self._applied = read_only(scenario.v0.copy())
+        self._arriving = deque([self._applied] * plant.delay)
 
     def seen(self, q: Array) -> Array:
         """Measure the true configuration, (nq,); without noise the result is `q` itself."""
@@ -112,8 +115,9 @@ class StartedPlant:
         """
         self._arriving.append(v)
         arrived = self._arriving.popleft()
-        applied = self._drive(arrived, limits, self._dt)
-        return applied if applied is arrived else read_only(applied)
+        applied = self._drive(arrived, self._applied, limits, self._dt)
+        self._applied = applied if applied is arrived else read_only(applied)
+        return self._applied
 
     def watch(self, step: Step) -> None:
         """Watch a step that was applied.
@@ -130,18 +134,24 @@ class StartedPlant:
 class Ideal(Plant):
     """Applies the command, limits or not, which shows violations."""
 
-    def drive(self, v: Array, limits: Limits, dt: float) -> Array:
+    def drive(self, v: Array, v_before: Array, limits: Limits, dt: float) -> Array:
         """Return the command (see `Plant.drive`)."""
         return v
 
 
 @dataclass(frozen=True)
 class Saturating(Plant):
-    """Clips each joint to its velocity and position limits, which shows direction errors."""
+    """Clips each joint to its limits, which shows direction errors.
 
-    def drive(self, v: Array, limits: Limits, dt: float) -> Array:
+    They are those of acceleration, where they are in force, of velocity and of position, one after
+    the other: a position limit is an end stop, at which a joint stops at any deceleration.
+    """
+
+    def drive(self, v: Array, v_before: Array, limits: Limits, dt: float) -> Array:
         """Clip the command (see `Plant.drive`)."""
-        velocity = limits.joint.velocity
+        acceleration, velocity = limits.joint.acceleration, limits.joint.velocity
+        if acceleration is not None:
+            v = np.clip(v, v_before + acceleration.lower * dt, v_before + acceleration.upper * dt)
         if velocity is not None:
             v = np.clip(v, velocity.lower, velocity.upper)
         if limits.to_lower is not None and limits.to_upper is not None:
@@ -155,7 +165,7 @@ class Saturating(Plant):
 class Protective(Plant):
     """Applies the command and stops at the first limit or distance that is broken, as drives do."""
 
-    def drive(self, v: Array, limits: Limits, dt: float) -> Array:
+    def drive(self, v: Array, v_before: Array, limits: Limits, dt: float) -> Array:
         """Return the command (see `Plant.drive`)."""
         return v
 

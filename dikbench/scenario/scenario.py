@@ -13,6 +13,7 @@ from dikbench.arrays import Array
 from dikbench.problem.constraints import Constraint, TorqueConstraint
 from dikbench.problem.embedding import Embedding, embedding_of
 from dikbench.problem.tasks import Task, TrackingTask, TrackingTogether
+from dikbench.problem.tasks.task import check_rotation
 from dikbench.robots.robot import Robot
 from dikbench.scenario.certificate import Certificate
 from dikbench.scenario.held_frame import HeldFrame, held_frames
@@ -96,8 +97,17 @@ class Scenario:
     situation: Situation = "free space"
 
     def __post_init__(self) -> None:
-        """Check the number of control steps (see `steps_in`)."""
+        """Check the number of control steps (see `steps_in`), the start and the reference.
+
+        Raises:
+            DikbenchError: if the start is no configuration, or the reference no placement at its
+                start, middle or end.
+        """
         steps_in(self.duration, self.dt)
+        self.robot.check_norms(self.q0, "scenario: start")
+        for share in (0.0, 0.5, 1.0):
+            placement = self.reference.placement(share * self.reference.duration)
+            check_rotation("scenario", placement.rotation)
 
     @cached_property
     def steps(self) -> int:

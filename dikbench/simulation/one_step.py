@@ -15,10 +15,17 @@ from dikbench.errors import DikbenchError, unknown
 from dikbench.plugins.building import make_formulation
 from dikbench.problem.constraints import Constraint
 from dikbench.problem.posing import pose_problem
-from dikbench.problem.problem import Formulation, program_of, refusal_of
+from dikbench.problem.problem import (
+    DikProblem,
+    Formulation,
+    program_of,
+    refusal_of,
+    sight_of,
+)
 from dikbench.problem.progress import STUCK_PROGRESS, progress, row_weights
 from dikbench.problem.tasks import LinearizedTask, PoseTask, Task
 from dikbench.problem.tasks.rows import in_task_axes
+from dikbench.problem.tasks.task import check_weight
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.robot import Robot, checked_vector
 from dikbench.simulation.control_step import TrialEnded, control_step
@@ -56,8 +63,10 @@ def solve_dik(
     formulation: str | Formulation,
     twist: object = None,
     target: Any = None,
-    reference_frame: ReferenceFrame = "LOCAL",
+    reference_frame: ReferenceFrame | None = None,
     gain: float | None = None,
+    weight: float | Sequence[float] | Array = 1.0,
+    priority: int = 1,
     dt: float = 0.01,
     solver: str | None = None,
     v_prev: object = None,
@@ -75,13 +84,16 @@ def solve_dik(
         formulation: a formulation or its selector, such as `dls[damping=0.1]`.
         twist: desired twist of the task frame, (linear; angular), (6,) [m/s; rad/s].
         target: desired placement of the task frame (`pinocchio.SE3`); give this or a twist.
-        reference_frame: the axes in which the twist is given, Pinocchio's names.
+        reference_frame: the axes in which the twist is given, Pinocchio's names; default: LOCAL.
         gain: gain on the target's error [1/s]; default: 1/dt, which reaches it in one step.
+        weight: weight of the twist or target where tasks compete, one number or one per row of
+            `Robot.task_rows`.
+        priority: its priority; 1 is the most important.
         dt: control period [s].
         solver: a solver's selector, such as `osqp[eps_abs=1e-6]`; default: daqp[then=clarabel],
             or clarabel for a formulation written in cvxpy. Not used by formulations that need none.
         v_prev: velocity applied in the previous step, (nv,); None: no acceleration bound.
-        tasks: secondary tasks.
+        tasks: other tasks, in any order, of any priority (those below the first are secondary).
         constraints: conditions in addition to the joint limits.
 
     Raises:
@@ -99,7 +111,7 @@ def solve_dik(
             f"formulation: expected a formulation or its selector, got {formulation!r}"
         )
     _check_positive("dt", dt)
-    if reference_frame not in REFERENCE_FRAMES:
+    if reference_frame not in (None, *REFERENCE_FRAMES):
         raise unknown("reference_frame", reference_frame, REFERENCE_FRAMES)
     configuration = robot.configuration(q)
     previous = None if v_prev is None else checked_vector(v_prev, robot.nv, "v_prev")
@@ -115,9 +127,12 @@ def solve_dik(
             raise DikbenchError("gain: belongs to a target; a twist has none")
         main = _twist_task(kinematics, twist, reference_frame)
     else:
+        if reference_frame is not None:
+            raise DikbenchError("reference_frame: belongs to a twist; a target is in the world")
         main = _target_task(kinematics, target, 1 / dt if gain is None else gain)
+    _rank("twist" if target is None else "target", main, weight, priority)
     problem = pose_problem(kinematics, previous, dt, main, tasks, constraints)
-    reason = refusal_of(formulation, problem)
+    reason = refusal_of(formulation, problem) or _unseen(formulation, problem, priority)
     if reason:
         raise DikbenchError(f"formulation {type(formulation).__name__}: {reason}")
     solve = _solve_for(formulation, solver)
@@ -148,6 +163,22 @@ def _solve_for(formulation: Formulation, selector: str | None) -> CheckedSolve:
     return make_solve(solver, program)
 
 
+def _rank(what: str, task: LinearizedTask, weight: Any, priority: object) -> None:
+    """Give the main task its weight and its priority."""
+    check_weight(what, weight, len(task.V))
+    if not isinstance(priority, int) or priority < 1:
+        raise DikbenchError(f"priority: expected 1 (the most important), 2, ..., got {priority!r}")
+    task.weight = float(weight) if np.ndim(weight) == 0 else np.array(weight, dtype=float)
+    task.priority = priority
+
+
+def _unseen(formulation: Formulation, problem: DikProblem, priority: int) -> str:
+    """Why the main task would be ignored; empty where it is not."""
+    if priority == problem.tasks[0].priority or "lower-tasks" in sight_of(formulation):
+        return ""
+    return f"does not look at tasks below the first priority, such as this one of {priority}"
+
+
 def _check_positive(name: str, value: object) -> None:
     if not isinstance(value, Real) or not 0 < float(value) < float("inf"):
         raise DikbenchError(f"{name}: expected a positive finite number, got {value!r}")
@@ -160,7 +191,9 @@ def _check_tasks(tasks: object) -> None:
         )
 
 
-def _twist_task(kinematics: Kinematics, twist: object, reference_frame: str) -> LinearizedTask:
+def _twist_task(
+    kinematics: Kinematics, twist: object, reference_frame: str | None
+) -> LinearizedTask:
     """Make the task J v = V of a twist that is given in the axes of a reference frame."""
     robot = kinematics.robot
     V = checked_vector(twist, 6, "twist")

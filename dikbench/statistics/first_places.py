@@ -7,9 +7,11 @@ A formulation may be first (see `dependable`) only if it ran every case and
 - succeeds, over all cases that ask for motion, in more than half of what the best of those
   succeeds in: who stands still holds a pose well.
 
-Of these it is first in a situation if its success cannot be told apart from the best (see `rates`)
-and no other of them is faster beyond doubt, where the path may wait. Nothing else is compared, so
-that rows of formulations that may not be first change nothing.
+Of these it is first in a situation if its success cannot be told apart from the best and is nearly
+as large (see `rates`), and no other of them is faster beyond doubt, where the path may wait. Nobody
+is first in a situation of a few scenarios: an interval over so few is as wide as it is unreliable,
+and seeds of a scenario are too much alike to make up for it. Nothing else is compared, so that rows
+of formulations that may not be first change nothing.
 """
 
 from __future__ import annotations
@@ -31,6 +33,9 @@ SMALLEST_SHARE_OF_BEST: Final = 0.5
 
 MOST_BROKEN_SHARE: Final = 0.05
 """... and breaks limits or breaks off in at most this share of the trials."""
+
+FEWEST_SCENARIOS: Final = 5
+"""In situations of fewer scenarios nobody is first."""
 
 FASTER: Final = 1.05
 """A path is done faster where its duration is smaller by more than this ratio."""
@@ -80,13 +85,20 @@ def told_of(part: pd.DataFrame, candidates: Collection[Contender]) -> set[Conten
     return set(candidates) - set(untold)
 
 
+def too_few(part: pd.DataFrame) -> bool:
+    """Say whether a situation, of which these rows count, has too few scenarios for a first one."""
+    return part["scenario"].nunique() < FEWEST_SCENARIOS
+
+
 def first_places(part: pd.DataFrame, found: Rates) -> Mask:
-    """Say who is first in a situation, (k,).
+    """Say who is first in a situation, (k,); nobody where there are too few scenarios.
 
     Args:
         part: the rows of the situation that count.
         found: their rates of success, among those that may be first.
     """
+    if too_few(part):
+        return np.zeros(len(found.best), dtype=bool)
     return found.best & ~_slower(part, found, found.best)
 
 

@@ -1,14 +1,14 @@
-"""Bootstrap intervals of means over scenario families, scenarios and seeds; never over ticks.
+"""Bootstrap intervals of means over levels, such as families and scenarios; never over ticks.
 
 Trials are not independent: seeds of a scenario resemble one another, and so do the scenarios of a
-family. So families are drawn with replacement, in each drawn family scenarios, in each of those
-seeds (Davison & Hinkley 1997, section 3.8). `scipy.stats.bootstrap` draws from one flat sample and
-cannot express this; on a flat sample the two agree.
+robot and the robots of a family. So families are drawn with replacement, in each drawn family
+robots, in each of those scenarios, and so on (Davison & Hinkley 1997, section 3.8): a mean draws
+at the levels that it is a mean over. `scipy.stats.bootstrap` draws from one flat sample and cannot
+express this; on a flat sample the two agree.
 
-Indices are not drawn: a family drawn c times has its S scenarios drawn c S times in all, which is
-one multinomial draw, and the same holds for seeds. The result is weights, which are the same for
-all formulations and metrics (so that their differences are resampled together), and a matrix
-product.
+Indices are not drawn: a family drawn c times has its R robots drawn c R times in all, which is one
+multinomial draw, and the same holds below. The result is weights, which are the same for all
+formulations and metrics (so that their differences are resampled together), and a matrix product.
 """
 
 from __future__ import annotations
@@ -26,32 +26,35 @@ INTERVAL_COVERAGE = 0.95
 
 
 def draw_weights(
-    families: Sequence[Any],
-    scenarios: Sequence[Any],
+    *levels: Sequence[Any],
     resamples: int = RESAMPLES,
     seed: int = RESAMPLING_SEED,
 ) -> Array:
     """Count how often each trial is drawn in each resample, (resamples, n).
 
     Args:
-        families: the family of each of n trials.
-        scenarios: the scenario of each, distinguished within its family. Trials of one scenario are
-            its seeds.
+        levels: what each of n trials belongs to at each level, from the outside in: its family,
+            its scenario. Trials that agree at every level are drawn as such: they are the seeds.
         resamples: number of resamples.
         seed: of the drawing; the same seed gives the same intervals.
     """
     random = np.random.default_rng(seed)
-    tree: dict[Any, dict[Any, list[int]]] = {}
-    for place, (family, scenario) in enumerate(zip(families, scenarios, strict=True)):
-        tree.setdefault(family, {}).setdefault(scenario, []).append(place)
-    weights = np.empty((resamples, len(families)))
-    if not tree:
-        return weights
-    drawn = _equal_multinomial(random, np.full(resamples, len(tree)), len(tree))
-    for times, members in zip(drawn.T, tree.values(), strict=True):
-        inside = _equal_multinomial(random, times * len(members), len(members))
-        for share, places in zip(inside.T, members.values(), strict=True):
-            weights[:, places] = _equal_multinomial(random, share * len(places), len(places))
+    weights = np.empty((resamples, len(levels[0])))
+
+    def draw(places: list[int], times: Indices, inner: Sequence[Sequence[Any]]) -> None:
+        """Draw among the parts of some trials, which are drawn `times` (resamples,) in all."""
+        if not inner:
+            weights[:, places] = _equal_multinomial(random, times * len(places), len(places))
+            return
+        parts: dict[Any, list[int]] = {}
+        for place in places:
+            parts.setdefault(inner[0][place], []).append(place)
+        drawn = _equal_multinomial(random, times * len(parts), len(parts))
+        for share, members in zip(drawn.T, parts.values(), strict=True):
+            draw(members, share, inner[1:])
+
+    if len(levels[0]):
+        draw(list(range(len(levels[0]))), np.ones(resamples, dtype=np.intp), levels)
     return weights
 
 

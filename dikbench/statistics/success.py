@@ -1,8 +1,9 @@
 """Rates of success: which trials count, hierarchical means, paired differences to the best.
 
 A rate is the mean over families of the means over robots of the means over scenarios of the means
-over seeds, so that no family counts for more because it has more scenarios. Only trials count of
-scenarios that a known motion can do; of the others nobody knows whether anything can be done.
+over seeds, so that no family counts for more because it has more scenarios. Its intervals are drawn
+at the same levels. Only trials count of scenarios that a known motion can do; of the others nobody
+knows whether anything can be done.
 """
 
 from __future__ import annotations
@@ -34,7 +35,10 @@ FACTS: Final = ("robot", "feasible", "situation", "judged_by_path", "tolerance_m
 """Columns that are the same in all trials of a scenario and seed."""
 
 LEVELS: Final = ("scenario_family", "robot", "scenario")
-"""What trials are averaged over, from the outside in; seeds come last."""
+"""What trials are averaged over, and drawn at, from the outside in; seeds come last."""
+
+MOST_BEHIND: Final = 0.1
+"""Who is as good as the best has a rate at most this much below it, however few the cases are."""
 
 
 def with_facts(trials: pd.DataFrame) -> pd.DataFrame:
@@ -74,6 +78,10 @@ def succeeded_at(trials: pd.DataFrame, tolerance: float) -> Mask:
     return np.array([Judgement.of_row(row).at(tolerance).outcome.value in DONE for row in rows])
 
 
+ROUNDING: Final = 1e-9
+"""Rates that differ by less are the same."""
+
+
 @dataclass(frozen=True, eq=False)
 class Rates:
     """The rates of success of formulations over the same cases.
@@ -88,8 +96,8 @@ class Rates:
         whole: whether it ran every case, (k,).
         difference: of its rate to that of the best that competes, over the cases of both, (k,).
         lower, upper: the paired 95 % interval of that, (k,).
-        best: whether it competes and is the best, or cannot be told apart from it and is at least
-            as good as everybody that can.
+        best: whether it competes and is the best, or cannot be told apart from it, is at most
+            `MOST_BEHIND` behind it, and at least as good as everybody that can be told apart.
     """
 
     layout: TrialMatrix
@@ -110,8 +118,8 @@ def rates(
 ) -> Rates:
     """Compute the rates of success of every formulation, and compare each with the best.
 
-    The intervals are those of paired differences under a bootstrap over families, scenarios and
-    seeds. Who did not run every case does not compete, nor do oracles.
+    The intervals are those of paired differences under a bootstrap over families, robots, scenarios
+    and seeds. Who did not run every case does not compete, nor do oracles.
 
     Args:
         trials: rows that count (see `counted`).
@@ -132,17 +140,17 @@ def rates(
         may_win = competes & np.array([pair in candidates for pair in pairs], dtype=bool)
         competes = may_win if may_win.any() else competes
     nothing = np.full(len(rate), np.nan)
-    drawn = draw_weights(list(cases["scenario_family"]), list(cases["scenario"])) * base
+    drawn = draw_weights(*(list(cases[level]) for level in LEVELS)) * base
     found = Rates(
         layout, base, drawn, layout.contenders, rate, ran_there.sum(axis=0), whole,
         nothing, nothing, nothing, np.zeros(len(rate), dtype=bool),
     )  # fmt: skip
     if not competes.any():
         return found
-    first = int(np.flatnonzero(competes)[rate[competes].argmax()])
+    first = int(np.flatnonzero(competes & (rate >= rate[competes].max() - ROUNDING))[0])
     difference, lower, upper = paired_means(matrix - matrix[:, [first]], found)
     told_apart = rate[competes & (upper < 0)]
-    at_least = told_apart.max() if len(told_apart) else 0.0
+    at_least = max(told_apart.max(initial=0.0), rate[first] - MOST_BEHIND - ROUNDING)
     best: Mask = np.asarray(may_win & (upper >= 0) & (rate > 0) & (rate >= at_least))
     return replace(found, difference=difference, lower=lower, upper=upper, best=best)
 

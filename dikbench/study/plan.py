@@ -15,7 +15,7 @@ from dikbench.plugins.building import (
     make_scenario,
     scenario_parameters,
 )
-from dikbench.problem.problem import program_of
+from dikbench.problem.problem import Formulation, program_of
 from dikbench.scenario.oracle import ORACLE, ORACLES
 from dikbench.selector import Selector, parse_selector
 from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, parse_solver, why_not
@@ -112,12 +112,30 @@ def _check_timing(study: Study) -> None:
         )
 
 
+def _check_frozen(formulation: Formulation) -> None:
+    """Check that a formulation remembers nothing: times are of shuffled problems.
+
+    Raises:
+        DikbenchError: if its class is not frozen.
+    """
+    parameters = getattr(formulation, "__dataclass_params__", None)
+    if parameters is not None and not parameters.frozen:
+        raise DikbenchError(
+            f"class {type(formulation).__name__} may change itself from one control step to the "
+            "next; valid: @dataclass(frozen=True) above it"
+        )
+
+
 def _solvers_for(
     study: Study, formulation: Selector, solvers: Sequence[str]
 ) -> list[tuple[Selector, str]]:
     """Return the solvers with which a formulation runs, each with the reason if it cannot."""
-    with naming(formulation, study.name):
-        program = None if formulation.name in ORACLES else program_of(make_formulation(formulation))
+    program = None
+    if formulation.name not in ORACLES:
+        with naming(formulation, study.name):
+            made = make_formulation(formulation)
+            _check_frozen(made)
+            program = program_of(made)
     parsed = []
     for selector in map(parse_selector, solvers):
         with naming(selector, study.name):

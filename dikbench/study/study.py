@@ -22,7 +22,6 @@ from dikbench.plugins.source import digest
 from dikbench.problem.problem import program_of
 from dikbench.programs.quadratic_program import ProgramKind
 from dikbench.scenario.oracle import ORACLES
-from dikbench.scenario.plant import REFERENCE_MODES
 from dikbench.selector import Selector, alternatives, parse_selector
 from dikbench.solvers.catalogue.back_ends import (
     BACK_ENDS,
@@ -30,12 +29,15 @@ from dikbench.solvers.catalogue.back_ends import (
     is_installed,
     parse_solver,
 )
-from dikbench.study.split import SPLITS
+from dikbench.study.explained import explained
 
 DEFAULT_STUDY = "quick"
 
 SELECTED: Final = "selection"
 """The name of a study that was selected without naming one."""
+
+CHECKED: Final = "check-"
+"""What the name of a study begins with that is run with straw laws."""
 
 KIND_OF_AXIS: Final[Mapping[str, Literal["formulation", "scenario", "plant"]]] = MappingProxyType(
     {"formulations": "formulation", "scenarios": "scenario", "plants": "plant"}
@@ -124,7 +126,7 @@ def load_study(name_or_file: str) -> Study:
     except UnicodeDecodeError:
         raise DikbenchError(f"study {path}: not a text file in UTF-8") from None
     except msgspec.ValidationError as error:
-        raise DikbenchError(f"study {path}: {_explained(str(error))}") from None
+        raise DikbenchError(f"study {path}: {explained(str(error))}") from None
     except msgspec.DecodeError as error:
         raise DikbenchError(f"study {path}: not valid TOML: {error}") from None
     try:
@@ -195,17 +197,6 @@ def _canonical(axis: str, selector: Selector) -> Selector:
     if axis == "solvers":
         return selector.ordered(("interface", "preset", *sorted(selector.parameters)))
     return in_declared_order(KIND_OF_AXIS[axis], selector)
-
-
-def _explained(reason: str) -> str:
-    """Explain an error of msgspec, with the valid keys where the key was wrong."""
-    if "Invalid enum value" in reason:
-        return f"{reason}; valid: {', '.join(SPLITS if 'split' in reason else REFERENCE_MODES)}"
-    if "unknown field" not in reason:
-        return reason
-    place = Cells if "$.cells" in reason else TimingSettings if "$.timing" in reason else Study
-    valid = ", ".join(field.name for field in msgspec.structs.fields(place))
-    return f"{reason}; valid keys: {valid}"
 
 
 def _check_solver(text: str) -> None:

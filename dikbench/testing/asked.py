@@ -13,6 +13,7 @@ from dikbench.simulation.control_step import TrialEnded, control_step
 from dikbench.simulation.status import Status
 from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, Solver, parse_solver, why_not
 from dikbench.solvers.checked_solve import make_solve
+from dikbench.testing.cannot_check import CannotCheck
 from dikbench.testing.states import State, states
 
 LIMIT_TOLERANCE_RAD_S: Final = 1e-6
@@ -84,7 +85,8 @@ class Asked:
             else:
                 why = f"{state.label}: {answer.status.value}: {answer.message}"
         if not answered:
-            raise AssertionError(f"no answer at any state; the last one, {why}")
+            cause = f"no answer at any state; the last one, {why}"
+            raise CannotCheck(cause, cause)
 
 
 def asked_of(formulation: Formulation | Asked, solver: str | None) -> Asked:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import pickle
 from collections.abc import Callable
 from dataclasses import is_dataclass, replace
+from itertools import chain
 from math import isfinite, isnan, nan
 from types import UnionType
 from typing import Any, Final, Union, get_args, get_origin
@@ -24,8 +25,10 @@ from dikbench.errors import DikbenchError, in_words
 from dikbench.parameters import Parameter, parameters_of
 from dikbench.scenario.certificate import CertificateFailed
 from dikbench.scenario.family import Family
+from dikbench.scenario.misfits import misfits
 from dikbench.scenario.scenario import Scenario
-from dikbench.testing.fitting import misfits
+from dikbench.testing.cannot_check import CannotCheck
+from dikbench.testing.first_step import no_first_step
 
 SEEDS: Final = (0, 1, 2)
 """The seeds of the scenarios that are checked; 0 perturbs nothing."""
@@ -56,7 +59,7 @@ def check_family_ranges(family: Family) -> None:
     What is outside of a range, and NaN, must be refused by an error that names the parameter.
     """
     for name, parameter in parameters_of(type(family)).items():
-        if not _is_of(parameter, int, float):
+        if not parameter.numeric:
             continue
         if parameter.range is None:
             raise AssertionError(f"{name} is a number without a Range")
@@ -76,7 +79,8 @@ def check_family_ranges(family: Family) -> None:
             except DikbenchError:
                 pass  # it says why there is no such scenario
             except Exception as error:
-                raise AssertionError(f"{name}={value}: raised {in_words(error)}") from error
+                said = in_words(error)
+                raise CannotCheck(f"{name}={value}: raised {said}", said) from error
 
 
 def _changed(family: Family, name: str, value: object) -> Family:
@@ -133,7 +137,7 @@ def check_family_parts(family: Family) -> None:
     for seed in SEEDS:
         made = _scenario(family, seed)
         try:
-            wrong = next(misfits(made), "")
+            wrong = next(chain(misfits(made), no_first_step(made)), "")
         except MemoryError:
             raise
         except Exception as error:
@@ -191,9 +195,10 @@ def _scenario(family: Family, seed: int) -> Scenario:
     except MemoryError:
         raise
     except DikbenchError as error:
-        raise AssertionError(f"seed {seed}: {error}") from error
+        raise CannotCheck(f"seed {seed}: {error}", str(error)) from error
     except Exception as error:
-        raise AssertionError(f"seed {seed}: raised {in_words(error)}") from error
+        said = in_words(error)
+        raise CannotCheck(f"seed {seed}: raised {said}", said) from error
 
 
 def _difference(a: Scenario, b: Scenario) -> str:

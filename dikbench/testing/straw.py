@@ -83,11 +83,13 @@ class Jittery(Parameters):
 class Shaker(Parameters):
     """Shakes with a period of four steps: v = s J^+ V +- share v_max, two steps up and two down.
 
+    No step of it is faster than the joints accelerate where their limits are not known.
+
     Attributes:
         share: amplitude over the velocity limits.
     """
 
-    share: Annotated[float, Range(0.0, 1.0)] = 0.1
+    share: Annotated[float, Range(0.0, 1.0)] = 0.02
     signs: cycle[float] = field(
         default_factory=lambda: cycle((1.0, 1.0, -1.0, -1.0)), init=False, compare=False, repr=False
     )

@@ -10,6 +10,7 @@ from typing import Final, Literal, NamedTuple
 from dikbench.problem.problem import Formulation, LimitKind, promises_of
 from dikbench.scenario.family import Family
 from dikbench.testing.asked import Asked
+from dikbench.testing.cannot_check import CannotCheck
 from dikbench.testing.contract import (
     CHECKS,
     Check,
@@ -33,10 +34,13 @@ PROMISES: Final[Mapping[Check, LimitKind]] = MappingProxyType(
 
 
 class Verdict(NamedTuple):
-    """What came of one check; `reason` says in one line what was violated."""
+    """What came of one check; `reason` says in one line what was violated.
+
+    A check is `not checked` for a cause for which another is `BROKEN` already.
+    """
 
     check: str
-    outcome: Literal["kept", "not promised", "BROKEN"]
+    outcome: Literal["kept", "not promised", "BROKEN", "not checked"]
     reason: str = ""
 
 
@@ -48,32 +52,45 @@ def verdicts_on_formulation(
     Raises:
         DikbenchError: if the solver is unknown or cannot take what the formulation needs solved.
     """
-    declaration = _verdict("declaration", partial(check_declaration, formulation, solver))
+    declaration = _verdict("declaration", partial(check_declaration, formulation, solver), {})
     yield declaration
     if declaration.outcome == "BROKEN":
         return
-    asked = Asked(formulation, solver)
+    asked, causes = Asked(formulation, solver), dict[str, str]()
     for check in CHECKS[1:]:
         name = check.__name__.removeprefix("check_").replace("_", " ")
         if check in PROMISES and PROMISES[check] not in promises_of(formulation):
             yield Verdict(name, "not promised")
         else:
-            yield _verdict(name, partial(check, asked, None))
+            yield _verdict(name, partial(check, asked, None), causes)
 
 
 def verdicts_on_family(family: Family) -> Iterator[Verdict]:
     """Run the checks of a scenario family one by one; a broken declaration ends them."""
+    causes: dict[str, str] = {}
     for check in FAMILY_CHECKS:
         name = check.__name__.removeprefix("check_family_").replace("_", " ")
-        verdict = _verdict(name, partial(check, family))
+        verdict = _verdict(name, partial(check, family), causes)
         yield verdict
         if check is check_family_declaration and verdict.outcome == "BROKEN":
             return
 
 
-def _verdict(name: str, check: Callable[[], None]) -> Verdict:
+def _verdict(name: str, check: Callable[[], None], causes: dict[str, str]) -> Verdict:
+    """Make a check.
+
+    Args:
+        name: of the check.
+        check: the check.
+        causes: what kept earlier checks from being made, with the first of them; added to.
+    """
     try:
         check()
+    except CannotCheck as error:
+        first = causes.setdefault(error.cause, name)
+        if first != name:
+            return Verdict(name, "not checked", f"for the same cause as {first}")
+        return Verdict(name, "BROKEN", " ".join(str(error).split()))
     except AssertionError as error:
         return Verdict(name, "BROKEN", " ".join(str(error).split()))
     return Verdict(name, "kept")

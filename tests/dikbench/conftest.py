@@ -20,7 +20,9 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def _run(out: Path) -> None:
     selection = Selection(
-        scenarios=("reach", "near-miss[miss=0.02]"), references=("time", "path"), seeds=(0, 1)
+        scenarios=("reach[dt=0.02]", "near-miss[miss=0.02,dt=0.02]"),
+        references=("time", "path"),
+        seeds=(0, 1),
     )
     run_study(
         select(load_study("smoke"), selection, named=True), out, RunSettings(jobs=2), "a test"

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from makers.runs import without_workers
 
 import dikbench
 from dikbench.problem import tasks
@@ -42,8 +43,14 @@ def test_python_m_dikbench_is_the_command() -> None:
 
 
 def test_a_study_runs_from_a_script_as_from_the_command_line(tmp_path: Path) -> None:
-    """Also from one without `if __name__ == "__main__"`, which new processes would run again."""
+    """Also from one without `if __name__ == "__main__"`, which new processes would run again.
+
+    Folders beside it that are called as dikbench's own are do not hide those.
+    """
     script = tmp_path / "script.py"
+    for name in ("formulations", "scenarios"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "__init__.py").touch()
     script.write_text(
         "import dikbench\n"
         "chosen = {'formulations': 'dls', 'scenarios': 'reach[duration=0.2]'}\n"
@@ -100,13 +107,14 @@ def test_a_trial_in_other_words_is_the_same_trial(tmp_path: Path) -> None:
         "scenarios": "reach[robot=panda,duration=2e-1]",
     }
     how: dict[str, Any] = {"references": "time", "jobs": 1, "report": False}
-    one = dikbench.run_study(**plain, **how, out=tmp_path / "one")
-    again = dikbench.run_study(**spelt, **how, out=tmp_path / "one")
+    with without_workers():
+        one = dikbench.run_study(**plain, **how, out=tmp_path / "one")
+        again = dikbench.run_study(**spelt, **how, out=tmp_path / "one")
+        other = dikbench.run_study(**plain, **how, out=tmp_path / "other")
     assert list(again.trials["id"]) == list(one.trials["id"])
     assert list(again.trials["formulation"]) == ["dls[damping=0.05]"]
     assert missing(again.trials, again.manifest) == 0
     assert again.trials["formulation_time_median_us"].notna().all()
-    other = dikbench.run_study(**plain, **how, out=tmp_path / "other")
     matched = match_trials(again.trials, other.trials)
     assert len(matched.a) == 1
     assert len(matched.only_a) == len(matched.only_b) == 0

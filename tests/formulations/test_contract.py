@@ -22,17 +22,23 @@ from dikbench.testing import CHECKS, Asked, Check, check_formulation
 LAWS = sorted(plugins("formulation"))
 
 
-def variants() -> Iterator[str]:
-    """Every law with each other value of each of its switches (a Literal or a bool)."""
-    for name in LAWS:
+def variants() -> Iterator[typing.Any]:
+    """Every law with each other value of each of its switches (a Literal or a bool).
+
+    The normal run has one other value of each switch, in turns from law to law.
+    """
+    for place, name in enumerate(LAWS):
         law = make_formulation(name)
         if program_of(law) == "cvxpy":  # slow, and the same law in other words
             continue
         for parameter, kind in typing.get_type_hints(type(law)).items():
             values = typing.get_args(kind) if typing.get_origin(kind) is Literal else ()
-            for value in ("false", "true") if kind is bool else values:
-                if str(value) != str(getattr(law, parameter)).lower():
-                    yield f"{name}[{parameter}={value}]"
+            values = ("false", "true") if kind is bool else values
+            others = [v for v in values if str(v) != str(getattr(law, parameter)).lower()]
+            for number, value in enumerate(others):
+                turn = number == place % len(others)
+                marks = () if turn else pytest.mark.long
+                yield pytest.param(f"{name}[{parameter}={value}]", marks=marks)
 
 
 @lru_cache(maxsize=1)
@@ -312,10 +318,10 @@ BROKEN: list[tuple[typing.Any, set[str]]] = [
 
 def failing(law: Formulation) -> set[str]:
     """Names of the checks that a law fails."""
-    names = set()
+    names, once = set(), Asked(law)
     for check in CHECKS:
         try:
-            check(law, None)
+            check(once, None)
         except AssertionError:
             names.add(check.__name__)
     return names

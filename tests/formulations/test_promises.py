@@ -29,7 +29,7 @@ LAWS += ["qp", "qp[braking=gain]", "qp[braking=one-step]", "qp[braking=sqrt]", "
 LAWS += ["sns[braking=one-step]", "sns[braking=sqrt]"]
 
 FAST = settings(
-    deadline=None, max_examples=60, suppress_health_check=[HealthCheck.too_slow], database=None
+    deadline=None, max_examples=30, suppress_health_check=[HealthCheck.too_slow], database=None
 )
 THOROUGH = settings(FAST, max_examples=5000)
 

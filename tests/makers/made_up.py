@@ -16,20 +16,26 @@ SCENARIOS: Final[Mapping[str, Mapping[str, Any]]] = {
         f"line[robot={robot},k={k}]": {"situation": "free space", "robot": robot}
         for robot, k in (("ur5", 1), ("ur5", 2), ("panda", 1))
     },
+    **{f"bend[k={k}]": {"situation": "free space", "robot": "iiwa"} for k in (1, 2)},
     **{
-        f"fold[k={k}]": {"situation": "near singularities", "robot": "ur5", "feasible": "path"}
-        for k in (1, 2, 3)
+        f"fold[robot={robot},k={k}]": {
+            "situation": "near singularities", "robot": robot, "feasible": "path",
+        }
+        for robot, k in (("ur5", 1), ("ur5", 2), ("ur5", 3), ("panda", 1), ("panda", 2))
     },
     **{f"edge[k={k}]": {"situation": "at joint limits", "robot": "iiwa"} for k in (1, 2)},
-    **{f"wall[k={k}]": {"situation": "obstacles or torques", "robot": "panda"} for k in (1, 2)},
+    **{
+        f"wall[k={k}]": {"situation": "obstacles or torques", "robot": "panda"}
+        for k in (1, 2, 3, 4, 5)
+    },
     **{
         f"step[k={k}]": {"situation": "steps", "robot": "ur5", "judged_by_path": 0.0}
-        for k in (1, 2)
+        for k in (1, 2, 3, 4)
     },
     "hold": {"situation": "steps", "robot": "ur5", "judged_by_path": 0.0},
     "far": {"situation": "free space", "robot": "ur5", "feasible": "no"},
     "odd": {"situation": "at joint limits", "robot": "ur5", "feasible": "unknown"},
-}
+}  # fmt: skip
 """Scenarios with what differs from one in free space; names are no families of dikbench."""
 
 CONTENDERS: Final = (

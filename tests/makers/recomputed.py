@@ -154,17 +154,17 @@ def geometric(ratios: dict[tuple[str, str], float], rows: list[Row]) -> float:
 
 
 def drawn_differences(rows: list[Row], one: Contender, other: Contender) -> list[float]:
-    """Draw families, in each scenarios, in each seeds, one after the other, 2000 times.
+    """Draw families, in each robots, in each scenarios, in each seeds, one by one, 2000 times.
 
     Returns:
         The differences of the rates of one and the other, over the cases of both.
     """
     of = {name: {case(r): r for r in own} for name, own in by_contender(rows).items()}
     weights = weights_of(rows)
-    tree: Any = defaultdict(lambda: defaultdict(list))
+    tree: Any = defaultdict(lambda: defaultdict(lambda: defaultdict(list)))
     differences = {}
     for key, row in {case(row): row for row in rows}.items():
-        tree[family(row)][row["scenario"]].append(key)
+        tree[family(row)][row["robot"]][row["scenario"]].append(key)
         pair = (of[one].get(key), of[other].get(key))
         if all(pair):
             values = [float(r["outcome"] in DONE) for r in pair if r]
@@ -173,13 +173,13 @@ def drawn_differences(rows: list[Row], one: Contender, other: Contender) -> list
     means = []
     for _ in range(2000):
         total = weight = 0.0
-        for name in draw.choices(list(tree), k=len(tree)):
-            scenarios = tree[name]
-            for scenario in draw.choices(list(scenarios), k=len(scenarios)):
-                for key in draw.choices(scenarios[scenario], k=len(scenarios[scenario])):
-                    if key in differences:
-                        total += weights[key] * differences[key]
-                        weight += weights[key]
+        for robots in draw.choices(list(tree.values()), k=len(tree)):
+            for scenarios in draw.choices(list(robots.values()), k=len(robots)):
+                for seeds in draw.choices(list(scenarios.values()), k=len(scenarios)):
+                    for key in draw.choices(seeds, k=len(seeds)):
+                        if key in differences:
+                            total += weights[key] * differences[key]
+                            weight += weights[key]
         if weight:
             means.append(total / weight)
     return means

@@ -37,8 +37,11 @@ VARIANTS: Mapping[str, tuple[str, ...]] = {
     "near-miss": ("", "miss=0", "robot=panda"),
     "obstacle": ("", "where=elbow"),
     "hold-still": ("", "posture=limit", "posture=singular"),
+    "speed-sweep": ("dt=0.05",),
+    "pick-and-place": ("dt=0.05",),
+    "hexagon": ("dt=0.01",),
 }
-"""Parameters with other claims than the defaults."""
+"""Parameters with other claims than the defaults, or with the same ones after fewer samples."""
 
 ELSEWHERE: Mapping[str, set[str]] = {
     "joint-limit-crossing": {"its share in the least-norm motion"},

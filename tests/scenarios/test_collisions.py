@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 import numpy as np
 import pytest
-from makers.scenarios import run_of, scenario_error
+from makers.scenarios import run_of, scenario_error, scenario_of
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
@@ -53,7 +53,7 @@ def _errors(run: Run, scenario: Scenario) -> Array:
 @pytest.mark.parametrize("selector", CASES)
 def test_a_law_that_does_not_look_runs_into_it(selector: str) -> None:
     """`dls` follows the path within millimetres, centimetres deep in what stands in its way."""
-    scenario = make_scenario(selector)
+    scenario = scenario_of(selector)
     run = run_of("dls", scenario)
     distance = _constraint(scenario).distances(scenario.robot, run.trace.q)
     assert distance.min() < -0.02
@@ -66,7 +66,7 @@ def test_distances_fall_below_the_margin_by_the_remainder_and_no_more(
     selector: str, law: str
 ) -> None:
     """What is left out of the linearisation of a step is all that is missing of the margin."""
-    scenario = make_scenario(selector)
+    scenario = scenario_of(selector)
     constraint, run = _constraint(scenario), run_of(law, scenario)
     distance = constraint.distances(scenario.robot, run.trace.q)
     remainder = float(constraint.remainders(scenario.robot, run.trace.q).min())

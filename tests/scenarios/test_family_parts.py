@@ -217,8 +217,6 @@ def test_a_fault_is_one_line_with_what_is_valid(family: Family, said: str) -> No
     assert said in message
     assert "\n" not in message
     assert len(message) < 250
-    broken = {verdict.check for verdict in verdicts_on_family(family) if verdict.reason}
-    assert "parts" in broken
 
 
 @pytest.mark.parametrize(
@@ -252,3 +250,6 @@ def test_the_parts_are_among_the_checks_of_a_family() -> None:
     assert check_family_parts in FAMILY_CHECKS
     with pytest.raises(AssertionError, match="away from q0"):
         check_family(planted(lambda family, robot, case: replace(case, q0=case.q0 + 1e-3)))
+    verdicts = verdicts_on_family(planted(stops_short, Reach))
+    (reason,) = (verdict.reason for verdict in verdicts if verdict.check == "parts")
+    assert reason.startswith("seed 0: at 2 s the exact motion leaves an error of ")

@@ -8,7 +8,7 @@ from math import pi
 import numpy as np
 import pinocchio as pin
 import pytest
-from makers.scenarios import metrics_of, put_robot, run_of, scenario_error
+from makers.scenarios import metrics_of, run_of, scenario_error
 
 from dikbench.errors import DikbenchError
 from dikbench.metrics import evaluate, motion_of
@@ -16,6 +16,7 @@ from dikbench.parameters import Range
 from dikbench.plugins.building import make_plant, make_scenario
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.loading import load_robot
+from dikbench.scenario import joint_oracle
 from dikbench.simulation.closed_loop import simulate
 from dikbench.simulation.oracle_formulation import OracleFormulation
 from dikbench.solvers.checked_solve import make_solve
@@ -108,37 +109,18 @@ def test_looking_one_step_ahead_brakes_too_late(deceleration: float) -> None:
 def test_an_approach_without_room_or_without_limit_does_not_certify(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A limit that is out of reach, and a start nearer than the robot can brake."""
+    """A motion measured far from its limit, and a start nearer than the robot can brake."""
     far = load_robot("ur5").limits.position
     assert far is not None
     lower, upper = far.lower.copy(), far.upper.copy()
     upper[0] = 50.0
-
-    class _Blunt:
-        """The UR5 whose path ends where the limit used to be."""
-
-        def with_limits(self, acceleration: float | None) -> object:
-            if acceleration is None:  # those of the family come later
-                return self
-            arm = load_robot("ur5").with_limits(acceleration=acceleration)
-            moved = arm.with_limits(position=(lower, upper))
-            object.__setattr__(moved, "limits", _Wide(moved.limits, arm.limits))
-            return moved
-
-    class _Wide:
-        """Limits that are far away when they are measured, and near when the path is built."""
-
-        def __init__(self, wide: object, near: object) -> None:
-            self._wide, self._near = wide, near
-
-        def __getattr__(self, name: str) -> object:
-            return getattr(self._near if name == "position" else self._wide, name)
-
-    put_robot(monkeypatch, _Blunt())
-    with pytest.raises(DikbenchError, match="deepest margin of the motion"):
-        make_scenario("joint-limit-approach")
-    put_robot(monkeypatch, load_robot("ur5"))
-    monkeypatch.setattr(sys.modules["scenarios.joint_limit_approach"], "BRAKING_DISTANCES", 0.5)
+    wide = load_robot("ur5").with_limits(position=(lower, upper))
+    module = sys.modules["scenarios.joint_limit_approach"]
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "joint_oracle", lambda _, *given: joint_oracle(wide, *given))
+        with pytest.raises(DikbenchError, match="deepest margin of the motion"):
+            make_scenario("joint-limit-approach")
+    monkeypatch.setattr(module, "BRAKING_DISTANCES", 0.5)
     with pytest.raises(DikbenchError, match="room before the limit over the braking distance"):
         make_scenario("joint-limit-approach[deceleration=2]")
 

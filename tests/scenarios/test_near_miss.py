@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 import pinocchio as pin
 import pytest
-from makers.scenarios import known_singularity, scenario_error
+from makers.scenarios import known_singularity, scenario_error, scenario_of
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
@@ -49,7 +49,7 @@ def _urdf(ending: str) -> str:
 @pytest.mark.parametrize(("robot", "name"), KNOWN)
 def test_the_path_misses_the_singular_placement_by_miss(robot: str, name: str, miss: float) -> None:
     """Half way, by a twist of that length; and nowhere is it nearer."""
-    scenario = make_scenario(_selector(robot, name, miss))
+    scenario = scenario_of(_selector(robot, name, miss))
     X_s = known_singularity(robot, name)[1].placement
     reference = scenario.reference
 
@@ -64,7 +64,7 @@ def test_the_path_misses_the_singular_placement_by_miss(robot: str, name: str, m
 @pytest.mark.parametrize(("robot", "name"), KNOWN)
 def test_the_motion_follows_the_path_inside_the_limits(robot: str, name: str) -> None:
     """Recomputed from its configurations: placement, singular values, margins and speeds."""
-    scenario = make_scenario(_selector(robot, name, 0.01))
+    scenario = scenario_of(_selector(robot, name, 0.01))
     motion, arm = _motion(scenario), scenario.robot
     kinematics = Kinematics(arm)
     for q, tau, sigma in zip(motion.q, motion.instants, motion.sigma_min, strict=True):
@@ -86,7 +86,7 @@ def test_the_motion_follows_the_path_inside_the_limits(robot: str, name: str) ->
 
 
 def _peaks(robot: str, name: str, misses: tuple[float, ...]) -> tuple[Array, Array]:
-    found = [_motion(make_scenario(_selector(robot, name, miss))) for miss in misses]
+    found = [_motion(scenario_of(_selector(robot, name, miss))) for miss in misses]
     return np.array([m.sigma_min.min() for m in found]), np.array(
         [np.abs(m.v).max() for m in found]
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from makers.problems import with_upper_limit
-from makers.scenarios import TWENTY_SEEDS, metrics_of, put_robot, scenario_error
+from makers.scenarios import TWENTY_SEEDS, metrics_of, put_robot, scenario_error, scenario_of
 
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_scenario
@@ -25,7 +25,7 @@ VARIANTS = [
 def test_every_arm_sweeps_both_curves_from_twenty_starts(selector: str, seeds: range) -> None:
     """The certificate holds (building asserts it), with the peak speed that was asked for."""
     for seed in seeds:
-        motion = make_scenario(selector, seed).motion
+        motion = scenario_of(selector, seed).motion
         assert motion is not None
         assert motion.peak_speed_ratio == pytest.approx(0.7, rel=0.02)
 
@@ -33,7 +33,7 @@ def test_every_arm_sweeps_both_curves_from_twenty_starts(selector: str, seeds: r
 @pytest.mark.parametrize("selector", VARIANTS)
 def test_the_peak_speed_is_that_of_the_pseudo_inverse(selector: str) -> None:
     """Recomputed without the oracle: the largest least-norm velocity on the path over its limit."""
-    scenario = make_scenario(selector)
+    scenario = scenario_of(selector)
     robot, motion = scenario.robot, scenario.motion
     assert motion is not None
     velocity = robot.limits.velocity
@@ -96,7 +96,7 @@ def test_beyond_the_limits_the_pseudo_inverse_breaks_them_and_scaling_falls_behi
 
 def test_below_the_limits_every_law_follows() -> None:
     """At 0.7 times nothing is left behind, but for what a step of 2 ms cannot follow."""
-    scenario = make_scenario("speed-sweep[robot=ur5,path=lemniscate,turn=0.3,dt=0.002]")
+    scenario = make_scenario("speed-sweep[robot=ur5,path=lemniscate,turn=0.3,dt=0.002,laps=1]")
     for law in ("pinv", "pinv[after=clip]", "qp", "lp-alpha"):
         assert metrics_of(law, scenario)["position_error_max_m"] < 1e-3
 

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from makers.scenarios import metrics_of, put_robot, scenario_error
+from makers.scenarios import TWENTY_SEEDS, metrics_of, put_robot, scenario_error
 
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_scenario
+from dikbench.robots.example_robot_data import data_file
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.loading import load_robot
 from dikbench.scenario import Scenario
@@ -40,10 +41,11 @@ def test_the_target_is_as_far_and_as_turned_as_asked(
     assert not scenario.reference.moving
 
 
+@pytest.mark.parametrize("seeds", TWENTY_SEEDS, ids=["few", "many"])
 @pytest.mark.parametrize("robot", DIRECTIONS)
-def test_the_target_can_be_held_inside_the_limits_from_any_start(robot: str) -> None:
+def test_the_target_can_be_held_inside_the_limits_from_any_start(robot: str, seeds: range) -> None:
     """For twenty seeds: the posture at the end of the straight way is inside them."""
-    for seed in range(21):
+    for seed in seeds:
         scenario = make_scenario(f"step[robot={robot}]", seed)
         start, target = _start(scenario), scenario.reference.placement(0.0)
         twist, q = pin.log6(start.actInv(target)), scenario.q0
@@ -71,6 +73,20 @@ def test_the_first_command_is_too_fast(robot: str) -> None:
     assert ratio > 1.1
     # The certificate takes it over the first fiftieth of the way.
     assert claims["first speed over limit"] == pytest.approx(ratio, rel=0.1)
+
+
+def test_on_a_urdf_the_directions_are_found() -> None:
+    """As far and as turned as asked, the same whenever it is made, with room for every seed."""
+    arm = f"step[robot={data_file('ur_description/urdf/ur5_robot.urdf')},frame=tool0,distance=0.15]"
+    made = [make_scenario(arm, seed) for seed in (0, 0, 1, 2)]
+    for scenario in made:
+        start, target = _start(scenario), scenario.reference.placement(0.0)
+        assert np.linalg.norm(target.translation - start.translation) == pytest.approx(0.15)
+        assert np.linalg.norm(pin.log3(start.rotation.T @ target.rotation)) == pytest.approx(1.5)
+        assert all(claim.holds for claim in scenario.certificate.claims)
+        assert scenario.feasible == "time"
+    first, again = (each.reference.placement(0.0).homogeneous for each in made[:2])
+    assert np.array_equal(first, again)
 
 
 def test_clipping_goes_off_course_and_scaling_does_not() -> None:
@@ -105,6 +121,7 @@ def test_a_step_that_asks_for_nothing_is_refused(monkeypatch: pytest.MonkeyPatch
         ("step[distance=0.5]", "distance=0.5 must be 0.05 to 0.3"),
         ("step[angle=3]", "angle=3.0 must be 0.5 to 2.62"),
         ("step[robot=base]", "valid: panda, ur3"),
+        ("step[rows=xyz]", "or a URDF, with all six rows"),
         ("step[duration=0]", "duration=0.0 must be finite and above 0"),
     ],
 )

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pinocchio as pin
 import pytest
-from makers.scenarios import run_of
+from makers.scenarios import run_of, scenario_of
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
@@ -59,7 +59,7 @@ def test_lift_can_be_held_but_not_done(robot: str) -> None:
 @pytest.mark.parametrize("robot", TorqueLimited.robots)
 def test_qp_and_hqp_keep_the_torques_and_laws_without_limits_pass_them(robot: str) -> None:
     """To 1e-6 at every step, none of them infeasible; the others by a tenth, in a tenth of them."""
-    scenario = make_scenario(f"torque-limited[robot={robot}]")
+    scenario = scenario_of(f"torque-limited[robot={robot}]")
     for law in ("qp", "hqp"):
         trace = run_of(law, scenario).trace
         assert usage_of(trace, scenario).max() < 1 + 1e-6
@@ -79,7 +79,7 @@ def test_alpha_scaling_keeps_them_wherever_it_has_an_answer(law: str, robot: str
 
     Where it is not, the fallback brakes as fast as the torques allow.
     """
-    scenario = make_scenario(f"torque-limited[robot={robot}]")
+    scenario = scenario_of(f"torque-limited[robot={robot}]")
     trace = run_of(law, scenario).trace
     used = usage_of(trace, scenario)
     infeasible = trace.status == STEP_CODE[Status.INFEASIBLE]

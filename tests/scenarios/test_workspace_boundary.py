@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from makers.problems import with_upper_limit
-from makers.scenarios import metrics_of, put_robot, scenario_error
+from makers.scenarios import TWENTY_SEEDS, metrics_of, put_robot, scenario_error
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
@@ -58,10 +58,11 @@ def test_the_reach_of_a_planar_arm_is_known_in_closed_form() -> None:
         assert _claims(scenario)["reach"] == pytest.approx(reach, abs=2e-4)
 
 
+@pytest.mark.parametrize("seeds", TWENTY_SEEDS, ids=["few", "many"])
 @pytest.mark.parametrize("robot", WorkspaceBoundary.robots)
-def test_the_boundary_is_singular_and_no_limit_from_any_start(robot: str) -> None:
+def test_the_boundary_is_singular_and_no_limit_from_any_start(robot: str, seeds: range) -> None:
     """For twenty seeds, as claimed; the motion ends at it, so there is no oracle."""
-    for seed in range(21):
+    for seed in seeds:
         scenario = make_scenario(f"workspace-boundary[robot={robot}]", seed)
         assert scenario.motion is None
         assert scenario.oracle is None

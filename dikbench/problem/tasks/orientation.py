@@ -12,6 +12,7 @@ from dikbench.arrays import Array
 from dikbench.problem.tasks.task import (
     FrameTask,
     LinearizedTask,
+    check_rotation,
     check_weight,
     part_of_target,
 )
@@ -49,6 +50,7 @@ class OrientationTask(FrameTask):
         R_d = part_of_target(
             goal, "rotation", (3, 3), "orientation task: expected a rotation (3, 3)"
         )
+        check_rotation("orientation task", R_d)
         R = kinematics.placement(index).rotation
         relative = R.T.dot(R_d)
         error: Array = pin.log3(relative)

@@ -11,7 +11,7 @@ import pinocchio as pin
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.problem.tasks.rows import in_task_axes, orientation_error
-from dikbench.problem.tasks.task import FrameTask, LinearizedTask, check_weight
+from dikbench.problem.tasks.task import FrameTask, LinearizedTask, check_rotation, check_weight
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.robot import Robot
 from dikbench.robots.task_rows import ALL_ROWS, PLANE_ROWS
@@ -50,6 +50,7 @@ class PoseTask(FrameTask):
             raise DikbenchError(
                 f"pose task: expected a pinocchio.SE3 as target, got {type(X_d).__name__}"
             )
+        check_rotation("pose task", X_d.rotation)
         check_weight("pose task", self.weight, len(robot.task_rows))
         X = kinematics.placement(index)
         if robot.task_rows not in (ALL_ROWS, PLANE_ROWS) or robot.task_axes == "world":

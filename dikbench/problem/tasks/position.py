@@ -13,6 +13,7 @@ from dikbench.problem.tasks.rows import in_task_axes
 from dikbench.problem.tasks.task import (
     FrameTask,
     LinearizedTask,
+    check_rotation,
     check_weight,
     part_of_target,
 )
@@ -54,6 +55,7 @@ class PositionTask(FrameTask):
         if velocity is not None:
             if not isinstance(goal, pin.SE3):
                 raise DikbenchError("position task: the twist of a target needs its pinocchio.SE3")
+            check_rotation("position task", goal.rotation)
             asked = X.rotation.T.dot(goal.rotation.dot(velocity.linear))
             V += in_task_axes(robot, X.rotation, asked)
         J = in_task_axes(robot, X.rotation, kinematics.jacobian(index)[:3])

@@ -40,13 +40,14 @@ class PostureTask:
         """Linearise the task at the configuration of `kinematics`.
 
         Raises:
-            DikbenchError: if the target is not an array of the robot's shape (nq,), or the weights
-                do not fit the robot.
+            DikbenchError: if the target is not an array of the robot's shape (nq,), a norm in it is
+                not 1, or the weights do not fit the robot.
         """
         robot = kinematics.robot
         if not isinstance(self.target, np.ndarray) or self.target.shape != robot.q0.shape:
             shape = getattr(self.target, "shape", type(self.target).__name__)
             raise DikbenchError(f"posture task: expected shape ({robot.nq},), got {shape}")
+        robot.check_norms(self.target, "posture task: target")
         check_weight("posture task", self.weight, robot.nv)
         error: Array = pin.difference(robot.model, kinematics.q, self.target)
         return LinearizedJointTask(

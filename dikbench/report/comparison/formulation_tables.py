@@ -10,14 +10,17 @@ from typing import Final
 
 import pandas as pd
 
-from dikbench.report.comparison.formulations import ACCURACY, FLOOR_M, Interval, Pair
+from dikbench.report.comparison.formulations import Interval, Pair
 from dikbench.report.selection.judged import IN_WORDS, SETTINGS
 from dikbench.report.tables import latex_table, markdown
+from dikbench.statistics.accuracy import ACCURACY, SMALLEST_DISTANCE_M
 from dikbench.statistics.success import Setting
 
 Rows = list[list[str]]
 
-SUCCESS: Final = ("situation", "against", "cases", "A %", "B %", "A - B", "won/lost", "odds", "p")
+SUCCESS: Final = (
+    "situation", "against", "cases", "A %", "B %", "A - B [points]", "won/lost", "odds", "p",
+)  # fmt: skip
 ACCURACY_AND_TIME: Final = (
     "situation", "against", "both", "error A/B", "rank-bis.", "duration A/B",
 )  # fmt: skip
@@ -32,17 +35,18 @@ def notes(pairs: Sequence[Pair], plant: str) -> list[str]:
     return [
         f"A is {pairs[0].a}; rows compare it, over the cases that both ran, on the {plant} plant. "
         "A case is a scenario and seed that a known motion can do.",
-        "A - B: paired difference of the rates of success (means over families, robots, scenarios "
-        "and seeds) in points, with its 95 % interval by a bootstrap over families, scenarios and "
-        "seeds; no interval where all cases agree.",
+        "A - B [points]: paired difference of the rates of success (means over families, robots, "
+        "scenarios and seeds), with its 95 % interval by a bootstrap over the same; no interval "
+        "where all cases agree.",
         "won/lost: scenarios in which A succeeds with more seeds than B, and with fewer. odds: won "
         "over lost (conditional odds ratio of the discordant pairs). p: exact two-sided McNemar "
         f"test of won and lost, by Holm's correction over the {overall} rows of all or kinematic "
         "situations, and over the others.",
-        f"error A/B: geometric mean of the ratios of {ACCURACY} (at least {1e3 * FLOOR_M:g} mm) "
-        "where both succeed, with its 95 % interval; below 1, A is the more accurate. rank-bis.: "
-        "matched-pairs rank-biserial correlation of the same, 1 where A is the more accurate in "
-        "all cases and -1 where in none.",
+        f"error A/B: geometric mean of the ratios of {ACCURACY} (less than "
+        f"{1e3 * SMALLEST_DISTANCE_M:g} mm counts as that) where both succeed and there is a path, "
+        "with its 95 % interval; below 1, A is the more accurate. rank-bis.: matched-pairs "
+        "rank-biserial correlation of the same, 1 where A is the more accurate in all "
+        "cases and -1 where in none.",
         "duration A/B: the same ratio of the slow-down, where the path may wait.",
     ]
 

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 import pandas as pd
 
-from dikbench.arrays import Array, Mask
+from dikbench.arrays import Array
 from dikbench.errors import DikbenchError, unknown
 from dikbench.report.comparison.differences import ROUNDING
 from dikbench.report.selection.judged import (
@@ -19,16 +19,11 @@ from dikbench.report.selection.judged import (
     judged_rows,
 )
 from dikbench.scenario.oracle import ORACLES
+from dikbench.statistics.accuracy import log_distances
 from dikbench.statistics.failures import ran
 from dikbench.statistics.paired_tests import holm, mcnemar, odds_ratio, rank_biserial
 from dikbench.statistics.success import FACTS, Setting, paired_means, rates, succeeded
 from dikbench.statistics.trial_matrix import CASE, CONTENDER
-
-ACCURACY: Final = "contour_error_6d_max_m"
-"""Whose ratio is the ratio of accuracy."""
-
-FLOOR_M: Final = 1e-6
-"""Errors below this count as this: nobody needs to be told apart there, and zeros have no ratio."""
 
 ALL: Final = "all situations"
 KINEMATIC: Final = "kinematic situations"
@@ -51,15 +46,16 @@ class Pair:
         scenarios: number of scenarios among them.
         rate_a, rate_b: their rates of success over them (hierarchical means).
         difference: rate_a - rate_b.
-        difference_interval: its 95 % interval, by a bootstrap over families, scenarios and seeds;
-            NaN where all cases agree.
+        difference_interval: its 95 % interval, by a bootstrap over families, robots, scenarios and
+            seeds; NaN where all cases agree.
         only_a, only_b: scenarios in which A succeeds with more seeds than B, and with fewer.
         odds_ratio: only_a / only_b.
         p: exact McNemar p value of them. Seeds of a scenario are no independent trials.
         p_holm: the same by Holm's correction, over all of `OVERALL` or all situations that are
             compared.
         both: number of cases in which both succeed.
-        error_ratio: geometric mean over them of A's error over B's (`ACCURACY`).
+        error_ratio: geometric mean over those with a path of A's error over B's (see
+            `log_distances`).
         error_interval: its 95 % interval.
         rank_biserial: matched-pairs rank-biserial correlation of the same; positive where A is the
             more accurate.
@@ -208,16 +204,15 @@ def _pair(
         interval = (float(lower[0]), float(upper[0])) if varies else NO_INTERVAL
         return float(means[0]), interval
 
-    def log_ratios(column: str, floor: float) -> Array:
-        """Compute ln(A / B) of each case in which both succeed, else NaN."""
-        values = found.layout.fill(both[column].to_numpy(dtype=float))
-        wins: Mask = (done == 1).all(axis=1) & np.isfinite(values).all(axis=1)
-        logs = np.log(np.maximum(np.where(wins[:, None], values, 1.0), floor))
-        apart = logs[:, 0] - logs[:, 1]
-        return np.where(wins, np.where(np.abs(apart) <= ROUNDING, 0.0, apart), np.nan)
+    def log_ratios(logarithms: Array) -> Array:
+        """Compute ln(A / B) of each case, NaN where one of the two has none."""
+        apart = np.subtract(*found.layout.fill(logarithms).T)
+        return np.where(np.abs(apart) <= ROUNDING, 0.0, apart)
 
     difference, difference_interval = paired(done[:, 0] - done[:, 1])
-    errors, durations = log_ratios(ACCURACY, FLOOR_M), log_ratios("slow_down", 0.0)
+    slow_down = both["slow_down"].where(succeeded(both) & np.isfinite(both["slow_down"]))
+    errors = log_ratios(log_distances(both))
+    durations = log_ratios(np.log(slow_down.to_numpy(dtype=float)))
     error, error_interval = paired(errors)
     duration, duration_interval = paired(durations)
     return replace(

@@ -17,6 +17,7 @@ from dikbench.report.selection.judged import IN_WORDS
 from dikbench.report.sentences.words import several
 from dikbench.report.tables.markdown import escape, markdown_rows
 from dikbench.results.columns import TRIAL
+from dikbench.statistics.failures import SKIPPED
 
 ON_CONSOLE: Final = 20
 """So many rows of a list are printed; a file holds all."""
@@ -75,8 +76,11 @@ def _verdict(comparison: Comparison) -> str:
 
 def _summary(comparison: Comparison) -> str:
     matched, formulations = comparison.matched, comparison.formulations
-    both, ok = len(matched.a), int(matched.both_ok.sum())
+    skipped = matched.a["status"].eq(SKIPPED) & matched.b["status"].eq(SKIPPED)
+    both, ok = int((~skipped).sum()), int(matched.both_ok.sum())
     told = [f"{several(both, 'trial')} in both, of which {ok} ended ok in both."]
+    if skipped.any():
+        told.append(f"{several(int(skipped.sum()), 'cell')} skipped in both.")
     if len(matched.status_changes):
         told.append(
             f"{len(matched.status_changes)} changed their status, {matched.newly_failed} to the "
@@ -160,7 +164,7 @@ def _metrics(comparison: Comparison, rows: int | None) -> list[str]:
         ],
         "mean A": head["mean_a"].map(_number),
         "mean B - A": head["mean_difference"].map(_signed),
-        "95 % interval": [_interval(row["low"], row["high"]) for row in _records(head)],
+        "95 % interval of B - A": [_interval(row["low"], row["high"]) for row in _records(head)],
         "worst B - A": head["worst_difference"].map(_signed).where(head["worse"] > 0, ""),
         "in": [
             f"{row['scenario']} seed {row['seed']}" if row["worse"] else ""
@@ -187,7 +191,7 @@ def _times(comparison: Comparison, rows: int | None) -> list[str]:
             "solver": head["solver"],
             "scenarios": head["scenarios"],
             "median, B over A": head["ratio"].map(_number),
-            "95 % interval": [
+            "95 % interval of the median": [
                 _interval(row["low"], row["high"], _number) for row in _records(head)
             ],
             "p99, B over A": head["p99_ratio"].map(_number),

@@ -20,9 +20,11 @@ from dikbench.report.drawing.figure import Figure
 from dikbench.report.sentences.limitations import Limitation, limitations, missing
 from dikbench.report.sentences.summary import Summary, summarise
 from dikbench.report.tables.every import make_tables
+from dikbench.report.tables.failures import Failures, failures
 from dikbench.report.tables.return_codes import return_codes
 from dikbench.report.tables.table import Table
 from dikbench.results.reading import Results
+from dikbench.statistics.failures import SKIPPED, has_failed
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +35,7 @@ class Contents:
         results: what it is about.
         summary: what a person reads first.
         tables: success, outcomes, tracking error, limit violation, timing, solvers.
+        failures: the worst failed trials.
         return_codes: a row per solver.
         families: the scenario families of the run.
         formulations: its formulations.
@@ -43,6 +46,7 @@ class Contents:
     results: Results
     summary: Summary
     tables: Sequence[Table]
+    failures: Failures
     return_codes: pd.DataFrame
     families: Sequence[Family]
     formulations: Sequence[FormulationOfRun]
@@ -67,16 +71,19 @@ class Contents:
 
     @cached_property
     def counts(self) -> list[tuple[int, str]]:
-        """How many trials there are, and how they ended; what did not occur is left out."""
+        """How many trials were run, and how they ended; what did not occur is left out.
+
+        Skipped cells are no trials: they are counted apart.
+        """
         trials = self.results.trials
         status = trials["status"]
         formulations = trials[["formulation", "solver"]].drop_duplicates()
         seeds, scenarios = trials["seed"].nunique(), trials["scenario"].nunique()
         one = len(formulations) == 1
         found = [
-            (len(trials), "trial" if len(trials) == 1 else "trials"),
-            (int((~status.isin(["ok", "skipped"])).sum()), "failed"),
-            (int(status.eq("skipped").sum()), "skipped"),
+            (ran := int(status.ne(SKIPPED).sum()), "trial run" if ran == 1 else "trials run"),
+            (int(has_failed(trials).sum()), "failed"),
+            (left := int(status.eq(SKIPPED).sum()), f"{'cell' if left == 1 else 'cells'} skipped"),
             (missing(trials, self.manifest), "missing"),
             (
                 len(formulations),
@@ -85,7 +92,7 @@ class Contents:
             (scenarios, "scenario" if scenarios == 1 else "scenarios"),
             (seeds, "seed" if seeds == 1 else "seeds"),
         ]
-        return [(count, what) for count, what in found if count or what in {"trials", "failed"}]
+        return [(count, what) for count, what in found if count or what in {"trials run", "failed"}]
 
     @property
     def environment(self) -> list[tuple[str, str]]:
@@ -128,6 +135,7 @@ def gather(results: Results, figures: Sequence[Figure]) -> Contents:
         results,
         summarise(trials),
         make_tables(trials),
+        failures(trials),
         return_codes(trials),
         families_of(trials),
         formulations_of(trials),

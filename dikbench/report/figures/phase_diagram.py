@@ -30,6 +30,9 @@ PER_PAGE = 20
 GAP = 0.18
 """Between the column of 0, which is a case of its own, and the others [cells]."""
 
+LEAST = 1e-9
+"""Zeros are drawn as this, at the low end of a logarithmic scale: who idles has a peak speed."""
+
 BROKE_OFF = CATEGORIES[-1]
 
 
@@ -93,13 +96,17 @@ def _maps(grid: PhaseGrid) -> list[_Map]:
         peak=grid.rows["velocity_peak_ratio"].where(ended),
     )
     shown = replace(grid, rows=rows)
-    errors, peaks = shown.values("error_mm", "median"), shown.values("peak", "median")
+    errors, peaks = (
+        {name: np.maximum(values, LEAST) for name, values in shown.values(column, "median").items()}
+        for column in ("error_mm", "peak")
+    )
     over = colormaps["YlOrRd"].with_extremes(under="#d5e3ee")
     return [
         _Map(
             "error",
             name,
-            f"Root mean square {name} [mm].",
+            f"Root mean square {name} [mm] of the motion, however much of the path it did: who "
+            "stands still has none (see the outcomes).",
             errors,
             colormaps["viridis_r"],
             _log_norm(errors, 1e-2, 1e3),

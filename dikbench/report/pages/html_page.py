@@ -23,6 +23,7 @@ from dikbench.report.tables.table import Column, TableCell, shown
 SECTIONS: Final = (
     ("summary", "Summary"),
     ("tables", "Tables"),
+    ("failures", "Failures"),
     ("return-codes", "Return codes"),
     ("figures", "Figures"),
     ("families", "Families"),

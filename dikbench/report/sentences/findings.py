@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 import pandas as pd
 
-from dikbench.arrays import Mask
+from dikbench.arrays import Array, Mask
 from dikbench.metrics import Outcome
 from dikbench.report.selection.judged import IN_WORDS
 from dikbench.report.sentences.words import (
@@ -19,11 +19,13 @@ from dikbench.report.sentences.words import (
     number,
     several,
 )
+from dikbench.statistics.accuracy import SMALLEST_DISTANCE_M, log_distances
 from dikbench.statistics.failures import ran
-from dikbench.statistics.first_places import first_places, told_of
+from dikbench.statistics.first_places import FEWEST_SCENARIOS, first_places, told_of, too_few
 from dikbench.statistics.stability import LARGEST_DRIFT_SHARE as DRIFT
 from dikbench.statistics.stability import STABLE
 from dikbench.statistics.success import (
+    ROUNDING,
     Contender,
     Rates,
     Setting,
@@ -32,9 +34,6 @@ from dikbench.statistics.success import (
     succeeded,
 )
 from dikbench.statistics.trial_matrix import CONTENDER
-
-SMALLEST_DISTANCE_M: Final = 1e-5
-"""Distances from the path below this are equally small: what is left is the sampling."""
 
 NEARER: Final = 1.05
 """Who is nearer to the path is so by more than this ratio."""
@@ -61,7 +60,7 @@ class Leaders:
     """Who is first in a situation of a setting.
 
     Attributes:
-        contenders: the formulations that are first.
+        contenders: the formulations that are first; empty where there are too few cases.
         alone: whether somebody else that may be first is not: else nobody stands out.
         found: the rates of all.
         finding: the sentence.
@@ -86,23 +85,29 @@ def leaders(
     """
     may_be = told_of(part, candidates)
     found = rates(part, succeeded(part), may_be)
+    every = list(found.contenders.itertuples(index=False, name=None))
+    rivals = np.array([name in may_be for name in every]) & found.whole
+    if too_few(part) and found.rate[rivals].max(initial=0.0) > 0:
+        text = (
+            f"success of {_sample(part)}: too few to say who is first ({FEWEST_SCENARIOS} "
+            f"scenarios are asked for); the candidates have {_range(found.rate[rivals])}."
+        )
+        return Leaders((), False, found, Finding(f"Too few cases where {IN_WORDS[setting]}", text))
     first = first_places(part, found)
     if not first.any():
         return None
-    every = list(found.contenders.itertuples(index=False, name=None))
-    rivals = np.array([name in may_be for name in every]) & found.whole
     alone = rivals.sum() == 1 or bool((rivals & ~first).any())
     order = sorted(np.flatnonzero(first), key=lambda k: -found.rate[k])
     if alone:
         question = f"First where {IN_WORDS[setting]}"
         said = _with_shares([(every[k], found.rate[k]) for k in order], names)
         said += ", not told apart" if len(order) > 1 else ""
-        said += _next(found, rivals & ~first, every, names)
+        said += _next(found, rivals & ~found.best, every, names)
     else:
         question = f"Nobody stands out where {IN_WORDS[setting]}"
-        low, high = number(100 * found.rate[order[-1]]), number(100 * found.rate[order[0]])
-        much = f"{high} %" if low == high else f"{low} to {high} %, not told apart"
+        much = _range(found.rate[first])
         said = f"all {len(order)} that may be first have {much}"
+        said += ", not told apart" if " to " in much else ""
     text = f"success of {_sample(part)}: {said}{_pace(part, setting, first, found)}."
     contenders = tuple(every[k] for k in order)
     return Leaders(contenders, alone, found, Finding(question, text))
@@ -125,16 +130,22 @@ def _sample(part: pd.DataFrame) -> str:
     )
 
 
+def _range(rates: Array) -> str:
+    """Say from which to which rate some go [%]."""
+    low, high = number(100 * float(rates.min())), number(100 * float(rates.max()))
+    return f"{high} %" if low == high else f"{low} to {high} %"
+
+
 def _next(found: Rates, others: Mask, every: Sequence[Contender], names: Names) -> str:
-    """Name the best of the others that can be told apart from the first."""
-    apart = np.flatnonzero(others & (found.upper < 0))
-    if not len(apart):
+    """Name the best of the others, ties together, and by how much they are behind the best."""
+    if not others.any():
         return ""
-    k = apart[found.rate[apart].argmax()]
-    low, high = number(-100 * found.upper[k]), number(-100 * found.lower[k])
+    most = found.rate[others].max()
+    who = [int(k) for k in np.flatnonzero(others & (found.rate >= most - ROUNDING))]
+    low, high = number(-100 * found.upper[who].max()), number(-100 * found.lower[who].min())
     points = low if low == high else f"{low} to {high}"
-    share = number(100 * found.rate[k])
-    return f"; next is {names.of([every[k]])} with {share} %, {points} points less"
+    named = names.of([every[k] for k in who])
+    return f"; next is {named} with {number(100 * most)} %, {points} points less"
 
 
 def _pace(part: pd.DataFrame, setting: Setting, first: Mask, found: Rates) -> str:
@@ -154,37 +165,37 @@ def _pace(part: pd.DataFrame, setting: Setting, first: Mask, found: Rates) -> st
 
 
 def most_accurate(part: pd.DataFrame, leading: Leaders, names: Names) -> Finding | None:
-    """Say who of the first is nearest to the path, in trials that all of them did.
+    """Say who of the first is nearest to the path, in the cases that all of them did.
 
-    None where they are alike, or where there is one alone.
+    Distances and ratios are geometric means over these cases, paired (see `log_distances`). None
+    where they are alike, or where there is one alone.
     """
     if len(leading.contenders) < 2:
         return None
     found = leading.found
     every = list(found.contenders.itertuples(index=False, name=None))
     columns = [every.index(name) for name in leading.contenders]
-    away = part["contour_error_6d_max_m"].clip(lower=SMALLEST_DISTANCE_M)
-    away = away.where(succeeded(part) & part["judged_by_path"].eq(1))
-    matrix = found.layout.fill(np.log(away.to_numpy(dtype=float)))[:, columns]
+    matrix = found.layout.fill(log_distances(part))[:, columns]
     common = ~np.isnan(matrix).any(axis=1)
     if common.sum() < 2:
         return None
     matrix[~common] = np.nan
-    best = int(paired_means(matrix, found)[0].argmin())
+    away = 1e3 * np.exp(paired_means(matrix, found)[0])
+    best = int(away.argmin())
     means, lower, _ = paired_means(matrix - matrix[:, [best]], found)
     behind = np.flatnonzero((lower > 0) & (means > np.log(NEARER)))
     if not len(behind):
         return None
     second = behind[means[behind].argmin()]
     together = np.flatnonzero(means < means[second])
-    medians = np.nanmedian(np.exp(matrix[:, together]), axis=0)
-    low, high = number(1e3 * float(medians.min())), number(1e3 * float(medians.max()))
+    low, high = number(float(away[together].min())), number(float(away[together].max()))
+    floor = number(1e3 * SMALLEST_DISTANCE_M)
     text = (
         f"of these {names.of([leading.contenders[k] for k in together])}, "
-        f"{low if low == high else f'{low} to {high}'} mm from the path at most (medians of "
-        f"{several(int(common.sum()), 'case')} that all of them did; angles count with 0.2 m); "
-        f"next is {names.of([leading.contenders[second]])}, "
-        f"{number(float(np.exp(means[second])))} times as far (geometric mean)"
+        f"{low if low == high else f'{low} to {high}'} mm from the path at most; next is "
+        f"{names.of([leading.contenders[second]])}, {number(float(np.exp(means[second])))} times "
+        f"as far as the nearest (geometric means, paired over the {int(common.sum())} cases that "
+        f"all of the first did; less than {floor} mm counts as {floor} mm, angles with 0.2 m)"
     )
     return Finding("Most accurate", f"{text}.")
 

@@ -9,7 +9,7 @@ from typing import Any, Final
 import pandas as pd
 
 from dikbench.plugins.finding import plugins
-from dikbench.report.sentences.words import listed, number, quoted, several
+from dikbench.report.sentences.words import NOT_TIMED, listed, number, quoted, several
 from dikbench.scenario.oracle import ORACLE
 from dikbench.scenario.plant import PLANTS, REFERENCE_MODES
 from dikbench.selector import parse_selector
@@ -108,7 +108,7 @@ def in_plan(trials: pd.DataFrame, study: Mapping[str, Any]) -> pd.Series:
 
 def _times(trials: pd.DataFrame) -> list[Limitation]:
     if not trials["formulation_time_median_us"].notna().any():
-        return [Limitation("No times were taken: nothing is said of speed.")]
+        return [Limitation(f"Nothing is said of speed. {NOT_TIMED}")]
     found = [
         Limitation(
             "Times are of one run on one machine: compare ratios. Solvers are called cold, through "

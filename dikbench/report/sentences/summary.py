@@ -26,11 +26,12 @@ from dikbench.report.sentences.words import Names, several
 from dikbench.scenario.oracle import ORACLES
 from dikbench.scenario.situation import Situation
 from dikbench.statistics.first_places import (
+    FEWEST_SCENARIOS,
     MOST_BROKEN_SHARE,
     SMALLEST_SHARE_OF_BEST,
     dependable,
 )
-from dikbench.statistics.success import Contender, Setting, with_facts
+from dikbench.statistics.success import MOST_BEHIND, Contender, Setting, with_facts
 
 
 @dataclass(frozen=True)
@@ -125,5 +126,6 @@ def _basis(trials: pd.DataFrame) -> str:
         f"a collision or a failure in more than {100 * MOST_BROKEN_SHARE:g} % of them, or succeeds "
         f"overall in at most {100 * SMALLEST_SHARE_OF_BEST:g} % of what the best of the others "
         "does, may not be first; first is who of the rest cannot be told apart from the best "
-        "(95 % paired intervals) and is not slower than another of them."
+        f"(95 % paired intervals), is at most {100 * MOST_BEHIND:g} points behind it and is not "
+        f"slower than another of them, where at least {FEWEST_SCENARIOS} scenarios count."
     )

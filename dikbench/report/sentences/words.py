@@ -14,6 +14,12 @@ FEW: Final = 6
 """More names than this are counted, not listed."""
 
 
+NOT_TIMED: Final = (
+    "No timing pass was made: `dikbench time`, with the study and the options of the run, makes it."
+)
+"""Stands in place of times that nobody took."""
+
+
 def number(value: float) -> str:
     """Three significant digits, no exponent where it can be read without; rounding is 0."""
     if not math.isfinite(value):

@@ -40,7 +40,7 @@ def make_table(kind: TableKind, trials: pd.DataFrame) -> Table:
     """Make a table, overall and per family; plants and reference modes are never pooled.
 
     Every run counts, whatever came of it. Trials that were skipped count nowhere; a formulation of
-    which all trials were skipped has no row.
+    which all trials were skipped has no row. A table of times has rows where anything was timed.
 
     Args:
         kind: which table.
@@ -51,6 +51,8 @@ def make_table(kind: TableKind, trials: pd.DataFrame) -> Table:
         chosen = [replace(q, shown=place < SHOWN) for place, q in enumerate(chosen)]
     needed = {*_READ, *(quantity.of for quantity in chosen)}
     rows = _derived(ran(trials[[name for name in trials if name in needed]]))
+    if kind.times and not rows["timed"].any():
+        rows = rows[:0]
     if not kind.times:  # a failure is never folded into a time
         measured = {q.of for q in chosen} - set(DERIVED)
         rows = rows.assign(**{name: failures_at_worst(rows, name) for name in sorted(measured)})
@@ -60,7 +62,14 @@ def make_table(kind: TableKind, trials: pd.DataFrame) -> Table:
         for name, of_family in _families(rows)
         for setting, part in _settings(kind, of_family)
     ]
-    return Table(kind.name, kind.title, columns, tuple(blocks), tuple(_notes(kind)))
+    return Table(
+        kind.name,
+        kind.title,
+        columns,
+        tuple(blocks),
+        tuple(_notes(kind) if blocks else ()),
+        kind.empty,
+    )
 
 
 def _column(quantity: Quantity) -> Column:

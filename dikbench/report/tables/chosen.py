@@ -96,6 +96,8 @@ def _chosen(table: Table, columns: Sequence[str], formulations: Sequence[str]) -
             raise unknown("column", column, [c.key for c in table.columns])
     places = [of[column] for column in columns] or list(range(len(table.columns)))
     every = {row.formulation: None for block in table.blocks for row in block.rows}
+    if formulations and not every:
+        raise DikbenchError(f"the table {table.name} has no rows: {table.empty}")
     for formulation in formulations:
         if formulation not in every:
             raise unknown("formulation", formulation, list(every))

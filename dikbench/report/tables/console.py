@@ -60,6 +60,7 @@ def _block(table: Table, block: Block) -> str:
     lines += _fitting(columns)
     if any(cell.text == NOT_TOLD for row in top for cell in row.cells):
         lines.append(f"{UNSEEN}: {NOT_TOLD}")
+    lines += wrap(block.note, WIDTH)
     if len(block.rows) > ROWS:
         lines.append(f"and {len(block.rows) - ROWS} more: tables/{table.name}.md")
     return "\n".join(lines)

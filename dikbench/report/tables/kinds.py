@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import Final
 
 from dikbench.metrics import METRICS
+from dikbench.report.sentences.words import NOT_TIMED
 from dikbench.results.columns import TIMES
 
 MM: Final = 1e3
@@ -71,12 +72,14 @@ class TableKind:
         quantities: its columns, those that are shown first.
         times: whether its numbers are times, which belong to a formulation, a solver and a
             scenario, whatever the plant, reference mode and seed.
+        empty: what is said where it has no rows.
     """
 
     name: str
     title: str
     quantities: Sequence[Quantity]
     times: bool = False
+    empty: str = "Nothing was measured."
 
 
 DERIVED: Final[Mapping[str, str]] = MappingProxyType(
@@ -193,6 +196,7 @@ TIMING: Final = TableKind(
         *_more("missed_500_hz_share", "missed at 500 Hz", "%", PERCENT),
     ),
     times=True,
+    empty=NOT_TIMED,
 )  # fmt: skip
 
 KINDS: Final = (TRACKING_ERROR, LIMIT_VIOLATION, TIMING)

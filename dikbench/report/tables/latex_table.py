@@ -81,7 +81,10 @@ def escape(text: str) -> str:
 
 def to_latex(table: Table) -> str:
     """The part over all families as one tabular, a section per plant and reference mode."""
-    notes = [f"% {escape(note)}" for note in (table.title, *table.notes)]
+    of_blocks = [f"{block.setting}: {block.note}" for block in table.overall if block.note]
+    notes = [f"% {escape(note)}" for note in (table.title, *table.notes, *of_blocks)]
+    if not table.blocks:
+        return "\n".join([*notes, f"% {escape(table.empty)}", ""])
     return "\n".join([*notes, _tabular(table, table.overall), ""])
 
 

@@ -94,6 +94,8 @@ def markdown_blocks(table: Table, blocks: Iterable[Block]) -> str:
         if block.setting:
             parts.append(f"{escape(block.setting)}:")
         parts.append(aligned(header, rows, right))
+        if block.note:
+            parts.append(escape(block.note))
     return "\n\n".join(parts) or table.empty
 
 

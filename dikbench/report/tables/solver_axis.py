@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
+from dataclasses import replace
 from math import nan
 from typing import Final
 
 import pandas as pd
 
 from dikbench.report.selection.judged import judged_rows
+from dikbench.report.sentences.words import NOT_TIMED
 from dikbench.report.tables.kinds import MS, PERCENT
 from dikbench.report.tables.table import ALL, Block, Column, Table, TableCell, TableRow
 from dikbench.statistics.failures import ran
@@ -29,9 +32,17 @@ SHOWN: Final = (
 COLUMNS = (
     Column("runs", "runs", "number of runs, of any plant and reference", count=True),
     Column(
+        "judged",
+        "of them judged",
+        "number of those runs that success is of: on the plant of the table of success, where the "
+        "path may wait or the target is at rest, of scenarios that a known motion can do",
+        count=True,
+    ),
+    Column(
         "success_percent",
-        "success [%]",
-        "rate of success where the path may wait (see the table of success)",
+        "their success [%]",
+        "rate of success of the judged runs, families weighed equally, as in the last column of "
+        "the table of success where the path may wait",
         "high",
     ),
     Column(
@@ -48,12 +59,16 @@ COLUMNS = (
     ),
     Column(
         "residual_worst",
-        "residual worst",
+        "residual worst [rad/s]",
         "largest primal residual of all steps, answered or not",
         "low",
     ),
     Column(
-        "optimum_worst", "from optimum worst [rad/s]", "largest distance from the optimum", "low"
+        "optimum_worst",
+        "from optimum worst [rad/s]",
+        "largest distance from the optimum",
+        "low",
+        shown=False,
     ),
     Column("median_ms", "median call [ms]", "median over scenarios of the median call", "low"),
     Column("p99_ms", "99 % of the calls [ms]", "median over scenarios of the 99 % quantile", "low"),
@@ -68,23 +83,33 @@ def solver_axis(trials: pd.DataFrame) -> Table:
     """
     rows = ran(trials)
     rows = rows[rows["solver"].ne(str(NO_SOLVER))]
-    success = {}
+    success: dict[Hashable, tuple[int, float]] = {}
     if len(rows):
         judged = judged_rows(rows, "path")
         if len(judged):
             found = rates(judged, succeeded(judged))
             names = found.contenders.itertuples(index=False, name=None)
-            success = dict(zip(names, found.rate.tolist(), strict=True))
+            numbers = zip(found.trials.tolist(), found.rate.tolist(), strict=True)
+            success = dict(zip(names, numbers, strict=True))
     made = [
-        TableRow(str(name), str(solver), _cells(part, success.get((name, solver), nan)))
-        for (name, solver), part in rows.groupby(CONTENDER, sort=False)
+        TableRow(str(name), str(solver), _cells(part, *success.get(contender, (0, nan))))
+        for contender, part in rows.groupby(CONTENDER, sort=False)
+        for name, solver in [contender]
     ]
     blocks = (Block(ALL, None, None, tuple(made)),) if made else ()
-    notes = ("All runs count. Times are those of the timing pass.",)
-    return Table(SOLVERS, "Solvers on the same formulations", COLUMNS, blocks, notes)
+    timed = bool(rows["formulation_time_median_us"].notna().any())
+    columns = tuple(
+        replace(column, shown=column.shown and (timed or not column.key.endswith("_ms")))
+        for column in COLUMNS
+    )
+    notes = (
+        "Steps and residuals are of all runs, success of those that are judged.",
+        "Times are those of the timing pass." if timed else NOT_TIMED,
+    )
+    return Table(SOLVERS, "Solvers on the same formulations", columns, blocks, notes)
 
 
-def _cells(part: pd.DataFrame, success: float) -> tuple[TableCell, ...]:
+def _cells(part: pd.DataFrame, judged: int, success: float) -> tuple[TableCell, ...]:
     steps = part["steps"].to_numpy(dtype=float)
 
     def of_all_steps(column: str) -> float:
@@ -94,6 +119,7 @@ def _cells(part: pd.DataFrame, success: float) -> tuple[TableCell, ...]:
     times = part.drop_duplicates("scenario")
     numbers = (
         len(part),
+        judged,
         PERCENT * success,
         *map(of_all_steps, SHOWN[:2]),
         *(part[column].max() for column in SHOWN[2:]),

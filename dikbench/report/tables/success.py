@@ -33,13 +33,23 @@ from dikbench.report.tables.table import (
 from dikbench.scenario.situation import Situation
 from dikbench.statistics.first_places import (
     FASTER,
+    FEWEST_SCENARIOS,
     MOST_BROKEN_SHARE,
     SMALLEST_SHARE_OF_BEST,
     dependable,
     first_places,
     told_of,
+    too_few,
 )
-from dikbench.statistics.success import Contender, Rates, Setting, rates, succeeded, with_facts
+from dikbench.statistics.success import (
+    MOST_BEHIND,
+    Contender,
+    Rates,
+    Setting,
+    rates,
+    succeeded,
+    with_facts,
+)
 
 SHORT: Final[Mapping[Situation, str]] = MappingProxyType(
     {
@@ -74,12 +84,23 @@ def success_table(trials: pd.DataFrame) -> Table:
     )
     plant, every = judged_plant(trials), rows_of_all(of_setting)
     blocks = [
-        Block(ALL, plant, setting, _rows(rows, candidates, situations))
+        Block(ALL, plant, setting, _rows(rows, candidates, situations), _too_few(rows, situations))
         for setting, rows, candidates in (
             (setting, rows, dependable(rows, every)) for setting, rows in found.items()
         )
     ]
     return Table("success", TITLE, columns, tuple(blocks), tuple(_notes(trials)), NO_OUTCOMES)
+
+
+def _too_few(rows: pd.DataFrame, situations: Sequence[Situation]) -> str:
+    """Name the situations of a setting in which too few scenarios count for a star."""
+    parts = {situation: rows[rows["situation"].eq(situation)] for situation in situations}
+    few = [
+        f"{situation} ({several(part['scenario'].nunique(), 'scenario')})"
+        for situation, part in parts.items()
+        if len(part) and too_few(part)
+    ]
+    return f"Too few cases for stars: {', '.join(few)}." if few else ""
 
 
 def _rows(
@@ -194,10 +215,12 @@ def _notes(trials: pd.DataFrame) -> list[str]:
         "Who may be starred is stopped by a limit that it is told of, a collision or a failure in "
         f"at most {100 * MOST_BROKEN_SHARE:g} % of all trials, and successful overall in more than "
         f"{100 * SMALLEST_SHARE_OF_BEST:g} % of what the best of those is. A star: not told apart "
-        "from the best of those here (ties are all starred), and not slower than another of them "
-        f"by a ratio of more than {FASTER:g}.",
+        f"from the best of those here and at most {100 * MOST_BEHIND:g} points behind it (ties are "
+        "all starred), and not slower than another of them by a ratio of more than "
+        f"{FASTER:g}. Where fewer than {FEWEST_SCENARIOS} scenarios count nobody is starred.",
         "In brackets stands the 95 % interval of the difference to the best of those that may be "
-        "starred, in points, from a bootstrap of paired trials; none where it has no width.",
+        "starred, in points, from a bootstrap over families, robots, scenarios and seeds, trials "
+        "paired; none where it has no width.",
     ]
     if len(left_out):
         said = {"no": "cases that nothing can do", "unknown": "of which no motion is known"}

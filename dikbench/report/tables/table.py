@@ -108,12 +108,14 @@ class Block:
         plant: selector of the plant; None where the table does not tell plants apart (times).
         reference: `time` or `path`; None likewise.
         rows: one per formulation and solver, in the order of the trials.
+        note: a sentence that belongs under these rows; empty where there is none.
     """
 
     family: str
     plant: str | None
     reference: str | None
     rows: tuple[TableRow, ...]
+    note: str = ""
 
     @property
     def setting(self) -> str:

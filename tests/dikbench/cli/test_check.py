@@ -16,6 +16,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
+from dikbench.errors import CannotAnswer
 from dikbench.problem import Parameters, Range
 
 
@@ -34,6 +35,16 @@ class Still(Parameters):
         v = np.zeros(problem.robot.nv)
         v[0] = self.speed
         return v
+
+
+@dataclass(frozen=True)
+class Mute(Still):
+    """Promises two limits and answers nowhere."""
+
+    keeps: ClassVar[frozenset[str]] = frozenset({"velocity", "position"})
+
+    def velocity(self, problem, solve):
+        raise CannotAnswer("no")
 
 
 @dataclass
@@ -61,6 +72,14 @@ class Near(Reach):
     def case(self, robot, change):
         case = super().case(robot, change)
         return replace(case, claims=(Claim("lie", self.lie * change.seed, at_most=0.5),))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Raises(Reach):
+    """Fails in the words of Python."""
+
+    def case(self, robot, change):
+        return 1 / 0
 '''
 
 
@@ -132,11 +151,39 @@ def test_a_family_that_keeps_its_contract(plugins_file: Path) -> None:
 
 
 def test_a_family_whose_certificate_fails_for_a_seed(plugins_file: Path) -> None:
-    """The seed and the claim stand in the line; exit code 1."""
+    """The seed and the claim stand in the line, once, and what was not checked; exit code 1."""
     code, lines = checked(f"{plugins_file}:Near[lie=true]")
     assert code == 1
     reason = "certificate of 'Near' failed: lie = 1, must be <= 0.5"
     assert f"BROKEN        certificate: seed 1: {reason}" in lines
+    assert lines[-1] == (
+        "not checked   parts, seeds, deterministic, picklable: for the same cause as certificate"
+    )
+    assert sum("lie" in line for line in lines) == 1
+
+
+@pytest.mark.parametrize(
+    ("selector", "cause"),
+    [
+        ("Near[robot=nowhere.urdf,frame=tip]", "robot file not found: nowhere.urdf"),
+        ("Raises", "ZeroDivisionError: division by zero"),
+        ("Mute", "no answer at any state; the last one, "),
+    ],
+)
+def test_one_cause_is_named_once(plugins_file: Path, selector: str, cause: str) -> None:
+    """Each check stands in one line; those that could not be made stand together in the last."""
+    code, lines = checked(f"{plugins_file}:{selector}")
+    assert code == 1
+    (broken,) = [line for line in lines if cause in line]
+    assert broken.startswith("BROKEN")
+    first = broken[14:].partition(":")[0]
+    assert lines[-1].startswith("not checked   ")
+    assert lines[-1].endswith(f": for the same cause as {first}")
+    alone = [line[14:].partition(":")[0] for line in lines[:-1]]
+    together = lines[-1][14:].partition(":")[0].split(", ")
+    every = FAMILY_CHECKS if selector != "Mute" else CHECKS
+    assert len(alone) + len(together) == len(every)
+    assert len({*alone, *together}) == len(every)
 
 
 @pytest.mark.parametrize(

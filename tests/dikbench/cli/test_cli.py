@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import signal
 import sqlite3
@@ -10,6 +11,7 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import get_args
 
 import pandas as pd
 import pytest
@@ -17,8 +19,10 @@ from click.testing import CliRunner, Result
 
 from dikbench.cli import commands
 from dikbench.cli.listing import listing
-from dikbench.metrics import METRICS
+from dikbench.metrics import METRICS, Outcome
 from dikbench.plugins.finding import plugins
+from dikbench.scenario.plant import REFERENCE_MODES
+from dikbench.scenario.witness import Feasible
 
 FORMULATION = '''
 from __future__ import annotations
@@ -94,6 +98,11 @@ MALFORMED = [
     (("run", "--out", "afile/inside", "--formulation", "dls"), ("afile/inside",)),
     (("recompute", "nowhere"), ("no results", "nowhere")),
     (("list", "laws"), ("laws", "formulations")),
+    (("show", "nowhere.urdf"), ("robot file not found: nowhere.urdf",)),
+    (("show", "bad.urdf"), ("robot file bad.urdf: not a URDF that Pinocchio reads",)),
+    (("show", "csv[file=none.csv]"), ("none.csv",)),
+    (("check", "csv"), ("'file' must be given; valid: csv[file=...], a text",)),
+    (("run", "--scenario", "csv"), ("valid: csv[file=...], a text",)),
     (("show", "nothing"), ("nothing", "valid", "dikbench list")),
     (("show", "dls[dampin=1]"), ("dampin", "valid: damping")),
     (("show", "dls[damping=-1]"), ("damping=-1.0", "finite and at least 0")),
@@ -102,11 +111,18 @@ MALFORMED = [
     (("show", "panda[x=1]"), ("panda has no parameters", "valid in brackets")),
     (("show", "lag_max_s[x=1]"), ("lag_max_s has no parameters",)),
     (("show", "nofile.py:Family"), ("error: file not found: nofile.py",)),
-    (("show", "bad.py"), ("bad.py names a file without a class; valid: bad.py:Law, bad.py:Way",)),
+    (
+        ("show", "bad.py"),
+        ("bad.py names a file without a class; valid: bad.py:Law, bad.py:Thawed, bad.py:Way",),
+    ),
     (("check", "bad.py"), ("valid: bad.py:Law",)),
     (("run", "--scenario", "bad.py"), ("bad.py:Way",)),
     (("run", "--formulation", "bad.py"), ("bad.py:Law",)),
-    (("run", "--formulation", "bad.py:Low"), ("'Low'", "did you mean 'Law'", "valid: Law, Way")),
+    (("run", "--formulation", "bad.py:Thawed"), ("bad.py:Thawed", "@dataclass(frozen=True)")),
+    (
+        ("run", "--formulation", "bad.py:Low"),
+        ("'Low'", "did you mean 'Law'", "valid: Law, Thawed, Way"),
+    ),
     (("run", "bad.toml"), ("study bad.toml: cells[0].formulations: ", "damping='x'", "a number")),
     (("--plnt",), ("--plnt",)),
 ]
@@ -126,6 +142,17 @@ SHOWN = {
     "panda": "panda_hand_tcp",
     "direction_error_max_rad": "unit: rad",
     "quick": "[[cells]]",
+    "csv": "file must be given: csv[file=...]",
+    "csv[dt=0.02]": "file must be given: csv[dt=0.02,file=...]",
+    "needs.py:Needs": "strength must be given: needs.py:Needs[strength=...]",
+    "reach": "Its target is at rest: how to get to it is up to a formulation.",
+    "near-miss[miss=0.1]": "feasible unknown: neither a motion is known nor a proof",
+    "near-miss[miss=0.03]": "reference path: the reference moves on with the progress",
+    "near-miss[miss=0.04]": "outcome left-path: farther from the path",
+    "ur5": "wrist_3_joint (5): turns; position -6.283 to 6.283 rad; speed 3.2 rad/s; acceleration",
+    "gantry.urdf": "rail (0): slides; position -1 to 2 m; speed 0.5 m/s; torque or force 30 N",
+    "././gantry.urdf": "flap follows rail",
+    "./gantry.urdf": "wheel (1): turns without end; position -inf to inf rad; speed 2 rad/s",
 }
 
 ONE_AFTER_THE_OTHER = """
@@ -163,6 +190,11 @@ class Law:
     def velocity(self, problem, solve):
         return problem.q
 
+@dataclass
+class Thawed:
+    def velocity(self, problem, solve):
+        return problem.q
+
 @dataclass(frozen=True, kw_only=True)
 class Way(Reach):
     pass
@@ -172,6 +204,36 @@ description = "a wrong value in a list"
 scenarios = ["reach"]
 [[cells]]
 formulations = ["dls[damping=0.1|x|0.2]"]
+"""
+
+
+NEEDS = """
+from dataclasses import dataclass
+
+@dataclass(frozen=True)
+class Needs:
+    strength: float
+
+    def velocity(self, problem, solve):
+        return problem.q
+"""
+GANTRY = """
+<robot name="gantry">
+  <link name="floor"/><link name="cart"/><link name="hand"/><link name="camera"/>
+  <joint name="rail" type="prismatic">
+    <parent link="floor"/><child link="cart"/><axis xyz="1 0 0"/>
+    <limit lower="-1" upper="2" velocity="0.5" effort="30"/>
+  </joint>
+  <joint name="wheel" type="continuous">
+    <parent link="cart"/><child link="hand"/><axis xyz="0 0 1"/><limit velocity="2" effort="5"/>
+  </joint>
+  <link name="mirror"/>
+  <joint name="flap" type="revolute">
+    <parent link="cart"/><child link="mirror"/><axis xyz="0 1 0"/><mimic joint="rail"/>
+    <limit lower="-1" upper="2" velocity="2" effort="5"/>
+  </joint>
+  <joint name="mount" type="fixed"><parent link="cart"/><child link="camera"/></joint>
+</robot>
 """
 
 
@@ -186,6 +248,8 @@ def run_all(
         (each / "cwd" / "afile").touch()
         (each / "cwd" / "bad.py").write_text(CLASSES)
         (each / "cwd" / "bad.toml").write_text(SWEEP)
+        (each / "cwd" / "needs.py").write_text(NEEDS)
+        (each / "cwd" / "gantry.urdf").write_text(GANTRY)
     command = [sys.executable, "-c", ONE_AFTER_THE_OTHER, json.dumps(commands)]
     environment = os.environ if path is None else {**os.environ, "PYTHONPATH": str(path)}
     subprocess.run(command, cwd=folder, env=environment, check=True, timeout=600)
@@ -216,6 +280,8 @@ def test_malformed_input_is_one_line_and_exit_code_two(refused: list[Path], numb
         "bad.py",
         "bad.toml",
         "bad.urdf",
+        "gantry.urdf",
+        "needs.py",
     }
 
 
@@ -436,6 +502,27 @@ def _processes_in(folder: Path) -> list[str]:
         except OSError:  # gone, or not ours
             continue
     return found
+
+
+def test_the_frames_of_a_robot_are_shown_with_what_moves_them(tmp_path: Path) -> None:
+    """Those of a tree, in the order of the file."""
+    (tmp_path / "gantry.urdf").write_text(GANTRY)
+    shown = in_process("show", str(tmp_path / "gantry.urdf"))
+    assert shown.exit_code == 0
+    (frames,) = [line for line in shown.output.splitlines() if "camera" in line]
+    found = dict(re.findall(r"(\w+) \((\d)\)", frames))
+    assert {k: found[k] for k in ("floor", "cart", "hand", "camera")} == {
+        "floor": "0", "cart": "1", "hand": "2", "camera": "1",
+    }  # fmt: skip
+
+
+def test_every_word_of_a_verdict_is_explained() -> None:
+    """What a scenario's trials may be called, wherever `show` is asked."""
+    shown = in_process("show", "near-miss").output
+    words = {"feasible": get_args(Feasible), "reference": REFERENCE_MODES, "outcome": Outcome}
+    for of, each in words.items():
+        for word in each:
+            assert f"\n  {of} {word}: " in shown
 
 
 def test_a_scenario_is_shown_with_its_certificate_and_its_picture(tmp_path: Path) -> None:

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner
 from makers.plugins import law_with
+from makers.runs import without_workers
 
 import dikbench
 from dikbench.cli import commands
+from dikbench.invariants import with_straw_laws
 from dikbench.report.sentences.limitations import in_plan, missing
 from dikbench.results.reading import load_results
+from dikbench.study.study import load_study
 
 RUN = ("run", "--scenario", "reach[duration=0.1]", "--plant", "ideal", "--traces", "none")
 
@@ -48,9 +53,10 @@ def test_the_oracle_is_not_missing_for_ever(tmp_path: Path, way: tuple[str, str]
     """It ran as it can; nothing of the plan is missing and no row is of an earlier run."""
     options = (*RUN[:1], "--scenario", "speed-sweep[speed=0.5,laps=1]", *way, "--traces", "none")
     names = ("--formulation", "oracle", "--formulation", "slowed-oracle", "--formulation", "dls")
-    result = CliRunner().invoke(
-        commands, [*options, *names, "--jobs", "1", "--out", str(tmp_path / "out")]
-    )
+    with without_workers():
+        result = CliRunner().invoke(
+            commands, [*options, *names, "--jobs", "1", "--out", str(tmp_path / "out")]
+        )
     assert result.exit_code == 0, result.output
     results = load_results(tmp_path / "out")
     assert len(results.trials) == results.manifest["trials"] > 2
@@ -66,8 +72,55 @@ def test_empty_axes_are_the_study_s_own(tmp_path: Path) -> None:
         'description = "mine"\nscenarios = ["reach[duration=0.1]"]\nplants = ["ideal"]\n'
         'seeds = [3]\n[[cells]]\nformulations = ["dls"]\n'
     )
-    results = dikbench.run_study(
-        study, formulations=[], seeds=[], scenarios=(), out=tmp_path / "out", jobs=1, report=False
-    )
+    chosen: dict[str, Any] = {"formulations": [], "seeds": [], "scenarios": ()}
+    with without_workers():
+        results = dikbench.run_study(study, **chosen, out=tmp_path / "out", jobs=1, report=False)
     assert results.trials[["formulation", "seed"]].to_numpy().tolist() == [["dls", 3]]
     assert json.loads((tmp_path / "out" / "manifest.json").read_text())["trials"] == 1
+
+
+STUDY = """
+description = "mine"
+scenarios = ["reach[duration=0.1]"]
+plants = ["ideal"]
+[[cells]]
+formulations = ["dls"]
+"""
+
+
+def test_a_folder_holds_one_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another study, its times and a check with straw laws are refused in one line.
+
+    The same study goes on in it, and what is selected by options may be added, but not to what was
+    run with straw laws: its tables would be taken for those of a study.
+    """
+    monkeypatch.chdir(tmp_path)
+    for name in ("mine", "check-mine"):
+        Path(f"{name}.toml").write_text(STUDY)
+    Path("other.toml").write_text(STUDY + '[timing]\nreference = "dls"\n')
+
+    def ran(*study: str, **axes: str) -> int:
+        done = dikbench.run_study(*study, **axes, out="out", jobs=1, traces="none", report=False)  # type: ignore[arg-type]
+        return len(done.trials)
+
+    def refused(there: str, *arguments: str) -> None:
+        result = CliRunner().invoke(commands, [*arguments, "--out", "out"])
+        (line,) = result.stderr.splitlines()
+        assert result.exit_code == 2, line
+        assert f"out holds the results of study {there!r}" in line
+        assert "valid: another folder with --out" in line
+
+    assert ran("mine.toml") == 1
+    before = Path("out/trials.csv").read_bytes()
+    refused("mine", "run", "other.toml")
+    refused("mine", "time", "other.toml")
+    refused("mine", "check", "--benchmark", "mine.toml")
+    refused("mine", "check", "--benchmark", "other.toml")
+    assert Path("out/trials.csv").read_bytes() == before
+    assert ran("mine.toml") == 1
+    assert ran(formulations="pinv", scenarios="reach[duration=0.1]", plants="ideal") == 3
+    shutil.rmtree("out")
+    ran("check-mine.toml")  # as the check names what it runs
+    refused("check-mine", "run", "mine.toml")
+    refused("check-mine", *RUN, "--formulation", "pinv")
+    assert with_straw_laws(load_study("mine.toml")).name == "check-mine"

@@ -7,12 +7,13 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 import pytest
+from makers.runs import run_here
 
 from dikbench.invariants import INVARIANTS, Invariant, with_straw_laws
 from dikbench.invariants.of_rows import is_straw
 from dikbench.metrics import Outcome
 from dikbench.results.reading import read_results, without_attributes
-from dikbench.run.runner import RunSettings, run_study
+from dikbench.run.runner import RunSettings
 from dikbench.study.study import Cells, Study
 
 STUDY = Study(
@@ -41,7 +42,7 @@ STUDY = Study(
 def rows(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
     """Run the study once, with straw laws."""
     out = tmp_path_factory.mktemp("invariants")
-    run_study(with_straw_laws(STUDY), out, RunSettings(jobs=2, traces="none"), "test")
+    run_here(with_straw_laws(STUDY), out, RunSettings(jobs=2, traces="none"), "test")
     return without_attributes(read_results(out)).trials
 
 

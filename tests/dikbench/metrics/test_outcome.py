@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.signal import find_peaks
 
 from dikbench.arrays import Array
 from dikbench.metrics import Judgement, Outcome, Verdict, evaluate, judge, motion_of
@@ -73,6 +74,7 @@ LAWS: dict[str, Callable[[], Share | Gone]] = {
     "half": lambda: Share("pinv[after=scale]", 0.5, 0.5),
     "jittery": lambda: Share("pinv[after=scale]", 1.9, 0.1),
     "shaky": lambda: Share("pinv[after=scale]", 1.3, 0.7),
+    "trembling": lambda: Share("pinv[after=scale]", 0.98, 0.9),
     "clipped": lambda: Share("pinv[after=clip]"),
     "diverging": lambda: Gone(1e9),
     "failing": lambda: Gone(np.nan),
@@ -96,6 +98,21 @@ def segment_distance(point: Array, start: Array, end: Array) -> Any:
     square = np.maximum((way * way).sum(axis=-1), 1e-300)
     share = np.clip(((point - start) * way).sum(axis=-1) / square, 0.0, 1.0)
     return np.linalg.norm(point - start - share[..., None] * way, axis=-1)
+
+
+def shaking_steps(trace: Trace, scenario: Scenario) -> set[int]:
+    """Find the steps in which a joint reverses five times in 0.2 s, each by 1 % of its limit."""
+    found: set[int] = set()
+    limit = scenario.robot.limits.velocity
+    assert limit is not None
+    speeds = np.vstack([scenario.v0, trace.applied]) / limit.upper
+    for v in speeds.T:
+        peaks = [find_peaks(sign * v, prominence=0.01)[0].tolist() for sign in (1, -1)]
+        places = sorted([*peaks[0], *peaks[1]])
+        for first, last in zip(places, places[4:], strict=False):
+            if (last - first) * scenario.dt <= 0.2 + 1e-9:
+                found |= set(range(first - 1, last))
+    return found
 
 
 def expected(trace: Trace, scenario: Scenario, status: Status, tolerance: float) -> Outcome:
@@ -170,7 +187,7 @@ def expected(trace: Trace, scenario: Scenario, status: Status, tolerance: float)
     dv = np.diff(np.vstack([scenario.v0, trace.applied]), axis=0)
     known = robot.available_acceleration
     jump = dt * (robot.limits.velocity.upper / 0.1 if known is None else known)
-    count = 0
+    shaking, count = shaking_steps(trace, scenario), 0
     for k in range(trace.steps):
         found = False
         for joint, most in enumerate(np.broadcast_to(jump, dv.shape[1])):
@@ -178,7 +195,7 @@ def expected(trace: Trace, scenario: Scenario, status: Status, tolerance: float)
                 before = [i for i in range(k) if abs(dv[i, joint]) > most]
                 back = bool(before) and dv[before[-1], joint] * dv[k, joint] < 0
                 found |= back and k - before[-1] <= 2
-        count += found
+        count += found or k in shaking
     if count >= 10 and count > 0.05 * trace.steps:
         return Outcome.CHATTERING
     by_way = reference.moving and trace.mode == "time" and scenario.feasible == "path"

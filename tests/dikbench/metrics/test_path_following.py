@@ -139,11 +139,21 @@ def test_chatter_is_back_and_forth_beyond_the_acceleration_limit(
     factor: float, expected: float, dt: float
 ) -> None:
     """Of a joint whose velocity alternates, whatever the control period; but for the first step."""
-    scenario = replace(scenario_of("speed-sweep[laps=1]"), dt=dt, v0=np.zeros(7), duration=1.0)
     n = 100
-    jump = factor * largest_acceleration(scenario.robot)[2] * dt
+    v = np.zeros(n)
+    v[::2] = factor * largest_acceleration(scenario_of("speed-sweep[laps=1]").robot)[2] * dt
+    # Slower than this nothing shakes: what is left is what jumps.
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("dikbench.metrics.chatter.SHAKING_AMPLITUDE", 1.0)
+        assert _chattering_steps(v, dt) == expected * (n - 1)
+
+
+def _chattering_steps(velocity: Array, dt: float) -> float:
+    """Count the steps that chatter of a run in which one joint moves with a velocity, (n,)."""
+    n = len(velocity)
+    scenario = replace(scenario_of("speed-sweep[laps=1]"), dt=dt, v0=np.zeros(7), duration=1.0)
     v = np.zeros((n, 7))
-    v[::2, 2] = jump
+    v[:, 2] = velocity
     q = [scenario.q0]
     for each in v:
         q.append(pin.integrate(scenario.robot.model, q[-1], each * dt))
@@ -154,5 +164,33 @@ def test_chatter_is_back_and_forth_beyond_the_acceleration_limit(
         applied=v, status=none, relaxed=none, claimed=none, verified=none, primal=nothing,
         dual=nothing, gap=nothing, distance=nothing,
     )  # fmt: skip
-    chattering = METRICS["chatter_steps"].of(motion_of(trace, scenario))
-    assert chattering == expected * (n - 1)
+    return METRICS["chatter_steps"].of(motion_of(trace, scenario))
+
+
+@pytest.mark.parametrize("dt", [0.002, 0.005])
+@pytest.mark.parametrize(
+    ("frequency", "share", "shakes"),
+    [(12.5, 0.006, True), (25.0, 0.02, True), (8.0, 0.02, False), (12.5, 0.0045, False)],
+)
+def test_a_joint_shakes_from_10_hz_and_1_percent_on(
+    frequency: float, share: float, dt: float, *, shakes: bool
+) -> None:
+    """A sine on top of a slow motion, far within the accelerations; noise of 0.01 % is none."""
+    scenario = scenario_of("speed-sweep[laps=1]")
+    assert scenario.robot.limits.velocity is not None
+    limit = scenario.robot.limits.velocity.upper[2]
+    time = dt * np.arange(400)
+    noise = np.random.default_rng(0).uniform(-1e-4, 1e-4, len(time))
+    v = 0.02 * np.sin(0.5 * np.pi * time) + share * np.sin(2 * np.pi * frequency * time) + noise
+    count = _chattering_steps(limit * v, dt)
+    assert (count > 0.8 * len(time)) if shakes else count == 0
+
+
+def test_a_corner_is_no_shaking() -> None:
+    """Up, down and up again within 0.1 s, once in a while: paths have corners."""
+    scenario = scenario_of("speed-sweep[laps=1]")
+    assert scenario.robot.limits.velocity is not None
+    v = np.zeros(400)
+    for start in (50, 150, 250, 350):
+        v[start : start + 20] = 0.05 * np.abs(np.sin(np.linspace(0, 2 * np.pi, 20)))
+    assert _chattering_steps(scenario.robot.limits.velocity.upper[2] * v, 0.005) == 0

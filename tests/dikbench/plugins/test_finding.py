@@ -148,7 +148,8 @@ def test_a_module_without_a_table_is_named(install: Install) -> None:
     install("dikbench.formulations", builtin=module)
     assert error_of(make_formulation, "dls") == (
         "plug-in 'builtin' of dikbench.formulations: /elsewhere/formulations/__init__.py holds no "
-        "mapping FORMULATIONS"
+        "mapping FORMULATIONS; if it is not the plug-in's, a folder or module 'builtin_module' of "
+        "yours hides it: valid: another name"
     )
 
 

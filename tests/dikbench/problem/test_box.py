@@ -189,13 +189,21 @@ def test_outside_a_limit_the_box_asks_for_the_way_back(
     assert np.all(box.lower <= box.upper)
 
 
-def test_the_way_back_wins_over_acceleration() -> None:
-    """From rest 0.2 rad/s back at once is more than 10 rad/s^2 in 10 ms: given up and counted."""
+def test_the_way_back_begins_as_fast_as_acceleration_limits_allow() -> None:
+    """From rest 0.3 rad outside, 2 rad/s and 10 rad/s^2 in force: -0.1, -0.2, -0.2 ... rad/s."""
     limits = limits_at_distances([5.0], [-0.3], velocity=2.0, acceleration=10.0)
-    box = velocity_box(limits, np.zeros(1), 0.01)
-    assert box.upper == pytest.approx([-0.2])
-    assert box.lower == pytest.approx([-0.2])
-    assert box.relaxed == 1
+    for v_prev, asked in ((0.0, -0.1), (-0.1, -0.2), (-0.2, -0.2), (-1.0, -0.9)):
+        box = velocity_box(limits, np.array([v_prev]), 0.01)
+        assert box.upper == pytest.approx([asked])
+        assert box.lower == pytest.approx([v_prev - 0.1])
+        assert box.relaxed == 0
+
+
+def test_no_joint_moves_farther_out_whatever_its_acceleration() -> None:
+    """Outwards at 1 rad/s, 10 rad/s^2 in force: it stops at once, which is counted."""
+    limits = limits_at_distances([5.0], [-0.3], velocity=2.0, acceleration=10.0)
+    box = velocity_box(limits, np.ones(1), 0.01)
+    assert [*box.lower, *box.upper, box.relaxed] == [0.0, 0.0, 1]
 
 
 @pytest.mark.parametrize("braking", BRAKINGS)

@@ -74,7 +74,7 @@ choices_of_a_joint = st.one_of(
 )
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=25)
 @given(
     below=distances,
     above=distances,

@@ -7,19 +7,27 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 
 @pytest.fixture
 def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
-    """The figures that are drawn, in their order, open to be read."""
+    """The figures that are drawn, in their order, open to be read; their PNGs are empty."""
     kept: list[Any] = []
-    close = plt.close
+    close, print_png = plt.close, FigureCanvasAgg.print_png
 
     def keep(figure: Any) -> None:
         kept.append(figure)
         close(figure)
 
+    def print_empty(canvas: Any, file: Any, **options: Any) -> None:
+        if isinstance(file, Path):
+            file.touch()
+        else:  # a picture inside an SVG
+            print_png(canvas, file, **options)
+
     monkeypatch.setattr(plt, "close", keep)
+    monkeypatch.setattr(FigureCanvasAgg, "print_png", print_empty)
     return kept
 
 

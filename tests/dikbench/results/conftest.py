@@ -6,9 +6,10 @@ import shutil
 from pathlib import Path
 
 import pytest
+from makers.runs import run_here
 from makers.shared import made_once
 
-from dikbench.run.runner import RunSettings, run_study
+from dikbench.run.runner import RunSettings
 from dikbench.study.study import Cells, Study, TimingSettings
 
 STUDY = Study(
@@ -27,7 +28,7 @@ def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made_once(
         tmp_path_factory,
         "frames",
-        lambda folder: run_study(STUDY, folder, RunSettings(jobs=2), "a test"),
+        lambda folder: run_here(STUDY, folder, RunSettings(jobs=2), "a test"),
     )
 
 

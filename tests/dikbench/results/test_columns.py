@@ -10,12 +10,13 @@ from pathlib import Path
 import msgspec
 import pandas as pd
 import pytest
+from makers.runs import run_here
 
 from dikbench.metrics import METRICS
 from dikbench.report.comparison.comparison import compare
 from dikbench.report.write import write_report
 from dikbench.results.reading import read_results
-from dikbench.run.runner import RunSettings, run_study, status_of
+from dikbench.run.runner import RunSettings, status_of
 from dikbench.study.study import Cells, Study
 
 COMMITTED = Path(__file__).parents[3] / "results"
@@ -58,7 +59,7 @@ def test_a_run_continues_in_a_store_of_the_first_release(stored: Path, tmp_path:
     before = read_results(stored).trials
     study = msgspec.convert(read_results(stored).manifest["study"], Study)
     cells = (*study.cells, Cells(("pinv",)))
-    run_study(msgspec.structs.replace(study, cells=cells), folder, RunSettings(jobs=1), "again")
+    run_here(msgspec.structs.replace(study, cells=cells), folder, RunSettings(jobs=1), "again")
     after = read_results(folder).trials
     assert status_of(folder) == {"ok": 6, "skipped": 2}
     new = after["formulation"] == "pinv"

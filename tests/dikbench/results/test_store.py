@@ -18,6 +18,7 @@ import msgspec
 import pandas as pd
 import pytest
 from makers.plugins import law_with
+from makers.runs import run_here, without_workers
 from makers.shared import made_once
 
 from dikbench.errors import DikbenchError
@@ -25,7 +26,7 @@ from dikbench.results.folder import ResultsFolder
 from dikbench.results.reading import load_results
 from dikbench.results.store import Store
 from dikbench.run import runner
-from dikbench.run.runner import RunSettings, run_study, status_of, time_study
+from dikbench.run.runner import RunSettings, status_of, time_study
 from dikbench.run.trial_row import TracePolicy, run_trial
 from dikbench.study.identity import timing_id, trial_id
 from dikbench.study.plan import PlannedTrial, expand
@@ -64,7 +65,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made_once(
         tmp_path_factory,
         "undisturbed",
-        lambda folder: run_study(STUDY, folder, RunSettings(jobs=2), "a test"),
+        lambda folder: run_here(STUDY, folder, RunSettings(jobs=2), "a test"),
     )
 
 
@@ -133,7 +134,7 @@ def test_the_same_trial_has_the_same_id_however_it_is_spelt() -> None:
 def test_the_same_command_runs_only_what_is_missing(undisturbed: Path, tmp_path: Path) -> None:
     """Rows that are there keep their run; a changed study adds and deletes nothing."""
     shutil.copytree(undisturbed, tmp_path, dirs_exist_ok=True)
-    run_study(STUDY, tmp_path, RunSettings(jobs=1), "again")
+    run_here(STUDY, tmp_path, RunSettings(jobs=1), "again")
     pd.testing.assert_frame_equal(
         load_results(tmp_path).trials, load_results(undisturbed).trials, check_exact=True
     )
@@ -142,9 +143,9 @@ def test_the_same_command_runs_only_what_is_missing(undisturbed: Path, tmp_path:
 def test_a_changed_study_adds_and_never_deletes(tmp_path: Path) -> None:
     """What another study left stands behind what this one plans."""
     small = msgspec.structs.replace(STUDY, cells=STUDY.cells[:1], scenarios=STUDY.scenarios[:1])
-    run_study(small, tmp_path, RunSettings(jobs=1), "first")
+    run_here(small, tmp_path, RunSettings(jobs=1), "first")
     other = msgspec.structs.replace(small, cells=(Cells(("pinv",)),))
-    run_study(other, tmp_path, RunSettings(jobs=1), "second")
+    run_here(other, tmp_path, RunSettings(jobs=1), "second")
     formulations = list(load_results(tmp_path).trials["formulation"])
     assert formulations == ["pinv", "dls", "pinv[after=clip]"]
     assert status_of(tmp_path) == {"ok": 1}
@@ -190,7 +191,7 @@ def test_rerun_chooses_what_is_run_again(
 
     monkeypatch.setattr(runner, "run_trials", run_nothing)
     failed_in(undisturbed, tmp_path)
-    run_study(STUDY, tmp_path, RunSettings(jobs=2, rerun=rerun), "second")
+    run_here(STUDY, tmp_path, RunSettings(jobs=2, rerun=rerun), "second")
     assert len({p.id for p in chosen}) == len(chosen) == again
 
 
@@ -206,7 +207,7 @@ def test_what_is_run_again_has_a_new_row_in_place_of_the_old(
 ) -> None:
     """It is the row of an undisturbed run again, stamped with the second run."""
     failed_in(undisturbed, tmp_path)
-    run_study(STUDY, tmp_path, RunSettings(jobs=1, rerun="failed"), "second")
+    run_here(STUDY, tmp_path, RunSettings(jobs=1, rerun="failed"), "second")
     assert list(load_results(tmp_path).trials["run"]) == [2, 1, 1, 1, 1, 1]
     pd.testing.assert_frame_equal(table(tmp_path), table(undisturbed), check_exact=True)
 
@@ -214,7 +215,7 @@ def test_what_is_run_again_has_a_new_row_in_place_of_the_old(
 def test_rerun_of_what_is_not_there_is_one_line(tmp_path: Path) -> None:
     """With the nearest match, before anything runs."""
     with pytest.raises(DikbenchError, match=r"rerun 'dsl'.*dls"):
-        run_study(STUDY, tmp_path / "out", RunSettings(jobs=1, rerun="dsl"), "a test")
+        run_here(STUDY, tmp_path / "out", RunSettings(jobs=1, rerun="dsl"), "a test")
     assert not (tmp_path / "out").exists()
 
 
@@ -232,7 +233,7 @@ def test_two_runs_in_one_folder_exclude_each_other(tmp_path: Path) -> None:
     """The second says so in one line and touches nothing."""
     folder = ResultsFolder(tmp_path)
     with folder.lock(), pytest.raises(DikbenchError, match="another run is at work in it"):
-        run_study(STUDY, tmp_path, RunSettings(jobs=1), "second")
+        run_here(STUDY, tmp_path, RunSettings(jobs=1), "second")
     assert not folder.database.exists()
 
 
@@ -300,7 +301,7 @@ def test_a_read_only_folder_is_one_line(tmp_path: Path) -> None:
     """Before anything runs."""
     tmp_path.chmod(0o500)
     with pytest.raises(DikbenchError, match="cannot be written: permission denied"):
-        run_study(STUDY, tmp_path, RunSettings(jobs=1), "a test")
+        run_here(STUDY, tmp_path, RunSettings(jobs=1), "a test")
 
 
 def test_times_are_kept_and_taken_anew_on_request(tmp_path: Path) -> None:
@@ -308,7 +309,7 @@ def test_times_are_kept_and_taken_anew_on_request(tmp_path: Path) -> None:
     study = msgspec.structs.replace(
         STUDY, scenarios=STUDY.scenarios[:1], timing=TimingSettings("dls", problems=10, rounds=3)
     )
-    run_study(study, tmp_path, RunSettings(jobs=1, traces="none"), "first")
+    run_here(study, tmp_path, RunSettings(jobs=1, traces="none"), "first")
     assert list((tmp_path / "traces").iterdir()) == []
 
     def stamps() -> list[int]:
@@ -316,9 +317,10 @@ def test_times_are_kept_and_taken_anew_on_request(tmp_path: Path) -> None:
             return [run for (run,) in database.execute("SELECT run FROM times")]
 
     assert stamps() == [1, 1, 1]
-    run_study(study, tmp_path, RunSettings(jobs=1), "second")
+    run_here(study, tmp_path, RunSettings(jobs=1), "second")
     assert stamps() == [1, 1, 1]
-    time_study(study, tmp_path, "third")
+    with without_workers():
+        time_study(study, tmp_path, "third")
     assert stamps() == [3, 3, 3]
     assert len(pd.read_csv(tmp_path / "timing.csv")) == 3
     assert status_of(tmp_path) == {"ok": 3}
@@ -354,7 +356,7 @@ def test_a_killed_run_continues_to_the_same_rows(undisturbed: Path, tmp_path: Pa
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()
         assert rows_in(tmp_path / "out" / "results.sqlite") >= rows
-    run_study(STUDY, tmp_path / "out", RunSettings(jobs=2), "continued")
+    run_here(STUDY, tmp_path / "out", RunSettings(jobs=2), "continued")
     pd.testing.assert_frame_equal(table(tmp_path / "out"), table(undisturbed), check_exact=True)
     with sqlite3.connect(tmp_path / "out" / "results.sqlite") as database:
         assert database.execute("PRAGMA integrity_check").fetchone() == ("ok",)

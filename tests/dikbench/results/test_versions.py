@@ -11,11 +11,12 @@ from typing import Any
 
 import msgspec
 import pytest
+from makers.runs import run_here
 from makers.shared import made_once
 
 from dikbench.results.reading import load_results, read_results
 from dikbench.run import runner
-from dikbench.run.runner import RunSettings, run_study
+from dikbench.run.runner import RunSettings
 from dikbench.study.plan import PlannedTrial
 from dikbench.study.study import Cells, Study
 
@@ -34,7 +35,7 @@ def copy(tmp_path_factory: pytest.TempPathFactory, tmp_path: Path) -> Path:
     made = made_once(
         tmp_path_factory,
         "versions",
-        lambda folder: run_study(STUDY, folder, RunSettings(jobs=1, traces="none"), "a test"),
+        lambda folder: run_here(STUDY, folder, RunSettings(jobs=1, traces="none"), "a test"),
     )
     shutil.copytree(made, tmp_path, dirs_exist_ok=True)
     return tmp_path
@@ -85,7 +86,7 @@ def test_rows_of_another_source_are_hidden_outside_of_the_plan_too(
     """A law was edited and run on one scenario: its rows on the others are of another source."""
     execute(copy, "UPDATE trials SET id = 'before ' || id WHERE formulation = 'dls'")
     part = msgspec.structs.replace(STUDY, cells=(Cells(("dls",)),), scenarios=STUDY.scenarios[:1])
-    run_study(part, copy, RunSettings(jobs=1), "second")
+    run_here(part, copy, RunSettings(jobs=1), "second")
     first, second = STUDY.scenarios
     others = [(name, scenario) for name in ("pinv", "qp") for scenario in (first, second)]
     assert shown(copy) == [("dls", first), *others]
@@ -94,7 +95,7 @@ def test_rows_of_another_source_are_hidden_outside_of_the_plan_too(
     with sqlite3.connect(copy / "results.sqlite") as database:
         assert database.execute("SELECT COUNT(*) FROM trials").fetchone() == (7,)
     execute(copy, "UPDATE trials SET id = substr(id, 8) WHERE scenario LIKE '%0.2%'")
-    run_study(part, copy, RunSettings(jobs=1), "the edit was undone")
+    run_here(part, copy, RunSettings(jobs=1), "the edit was undone")
     assert ("dls", second) in shown(copy)
 
 
@@ -107,7 +108,7 @@ def test_times_of_another_source_are_hidden(copy: Path, chosen: list[PlannedTria
             f"formulation_time_median_us) SELECT '{name}', 'dls', 'none', scenario, 1, {time} "
             "FROM trials WHERE formulation = 'dls'",
         )
-    run_study(STUDY, copy, RunSettings(jobs=1), "second")
+    run_here(STUDY, copy, RunSettings(jobs=1), "second")
     assert load_results(copy).trials["formulation_time_median_us"].isna().all()
     assert chosen == []
 
@@ -115,7 +116,7 @@ def test_times_of_another_source_are_hidden(copy: Path, chosen: list[PlannedTria
 def test_a_newer_solver_does_not_rewrite_the_past(copy: Path, chosen: list[PlannedTrial]) -> None:
     """The same command after another solver was installed: nothing runs, and it says with what."""
     made_with(copy, "solvers", "daqp", "0.0.1")
-    run_study(STUDY, copy, RunSettings(jobs=1), "second")
+    run_here(STUDY, copy, RunSettings(jobs=1), "second")
     assert chosen == []
     manifest = json.loads((copy / "manifest.json").read_text())
     assert manifest["solvers"]["daqp"] == "0.0.1"
@@ -128,7 +129,7 @@ def test_a_newer_solver_does_not_rewrite_the_past(copy: Path, chosen: list[Plann
 def test_rows_of_two_versions_name_both(copy: Path) -> None:
     """A part was run again with another version of the solver: in the manifest, and in a note."""
     made_with(copy, "solvers", "daqp", "0.0.1")
-    run_study(STUDY, copy, RunSettings(jobs=1, rerun=STUDY.scenarios[0]), "second")
+    run_here(STUDY, copy, RunSettings(jobs=1, rerun=STUDY.scenarios[0]), "second")
     results = read_results(copy, lenient=True)
     first, second = results.manifest["solvers"]["daqp"].split(", ")
     assert first == "0.0.1" != second
@@ -153,7 +154,7 @@ def test_what_other_versions_made_is_run_again(
 ) -> None:
     """Of a solver the rows that used it; of a library or of dikbench all; of a machine none."""
     made_with(copy, kind, name, "0.0.1")
-    run_study(STUDY, copy, RunSettings(jobs=1, rerun="outdated"), "second")
+    run_here(STUDY, copy, RunSettings(jobs=1, rerun="outdated"), "second")
     assert [str(p.trial.formulation) for p in chosen] == again
 
 
@@ -164,5 +165,5 @@ def test_outdated_rows_are_current_once_they_were_run_again(copy: Path) -> None:
         STUDY, cells=(Cells(("dls",)), Cells(("lp-alpha",), ("proxqp",)))
     )
     for runs in ([2, 2, 2, 2], [2, 2, 2, 2]):
-        run_study(study, copy, RunSettings(jobs=1, rerun="outdated"), "again")
+        run_here(study, copy, RunSettings(jobs=1, rerun="outdated"), "again")
         assert list(load_results(copy).trials["run"])[:4] == runs

@@ -16,6 +16,7 @@ from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.problem.velocity_box import velocity_box
 from dikbench.robots.catalogue import ROBOTS
+from dikbench.robots.example_robot_data import data_file
 from dikbench.robots.kinematics import Kinematics, smallest_singular_value
 from dikbench.robots.loading import load_robot
 from dikbench.robots.robot import Robot, frame_id, model_limits
@@ -257,6 +258,18 @@ def test_a_urdf_without_a_frame_lists_its_frames(urdf: str) -> None:
     assert "name its task frame" in message
     for frame in ("base", "upper", "lower"):
         assert frame in message
+
+
+def test_a_urdf_of_many_frames_says_where_they_are_listed() -> None:
+    """The last ones, which are nearest to a tool, how many there are, and the command."""
+    path = data_file("talos_data/robots/talos_reduced.urdf")
+    with pytest.raises(DikbenchError) as caught:
+        load_robot(path)
+    said = str(caught.value)
+    frames = [frame.name for frame in pin.buildModelFromUrdf(path).frames][1:]
+    assert f"... ({len(frames)} in all, listed by `dikbench show {path}`)" in said
+    assert frames[-1] in said
+    assert len(said) - 2 * len(path) < 250
 
 
 def test_unknown_frames_name_the_nearest_and_the_valid_ones(urdf: str) -> None:

@@ -201,7 +201,7 @@ REFUSED = {
     "only_fixed": ("tool", "the model has no moving joint"),
     "limits_missing_bounds": (
         "tool",
-        "joint 'joint3' cannot move: its position limits are",
+        "joint 'joint3' cannot move: its position limits are both 0",
     ),
     "base": ("link0", "no joint moves frame link0"),
 }

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from makers.runs import run_here, without_workers
 from makers.shared import made_once
 
 from dikbench.errors import DikbenchError
@@ -19,7 +20,7 @@ from dikbench.metrics import METRICS
 from dikbench.results.folder import ResultsFolder
 from dikbench.results.reading import load_results
 from dikbench.run.recompute import Recomputed, recompute_results
-from dikbench.run.runner import RunSettings, run_study, status_of
+from dikbench.run.runner import RunSettings, status_of
 from dikbench.study.study import Cells, Study
 
 STUDY = Study(
@@ -38,8 +39,14 @@ def fresh(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made_once(
         tmp_path_factory,
         "fresh",
-        lambda folder: run_study(STUDY, folder, RunSettings(jobs=2), "a test"),
+        lambda folder: run_here(STUDY, folder, RunSettings(jobs=2), "a test"),
     )
+
+
+def recompute_here(folder: Path, jobs: int, command: str) -> Recomputed:
+    """Recompute as `recompute_results` does, without workers."""
+    with without_workers():
+        return recompute_results(folder, jobs, command)
 
 
 def copied(folder: Path, target: Path) -> Path:
@@ -65,7 +72,7 @@ def test_a_fresh_run_is_recomputed_to_the_same_bits(fresh: Path, tmp_path: Path)
     copy = copied(fresh, tmp_path / "copy")
     before = {name: (copy / name).read_bytes() for name in ("trials.csv", "timing.csv")}
     stored = load_results(copy).trials
-    done = recompute_results(copy, 1, "dikbench recompute")
+    done = recompute_here(copy, 1, "dikbench recompute")
     assert str(done) == f"{len(moved(copy))} trials recomputed"
     assert {name: (copy / name).read_bytes() for name in before} == before
     pd.testing.assert_frame_equal(load_results(copy).trials, stored, check_exact=True)
@@ -173,17 +180,17 @@ def test_a_trace_that_cannot_be_used_is_named(harmed: Harmed) -> None:
 def test_what_cannot_be_recomputed_is_one_line(fresh: Path, tmp_path: Path) -> None:
     """No results, another run at work, no trace at all, another schema."""
     with pytest.raises(DikbenchError, match=r"no results in .*: results.sqlite is missing"):
-        recompute_results(tmp_path / "nowhere", 1, "")
+        recompute_here(tmp_path / "nowhere", 1, "")
     assert not (tmp_path / "nowhere").exists()
     copy = copied(fresh, tmp_path / "copy")
     with ResultsFolder(copy).lock(), pytest.raises(DikbenchError, match="another run is at work"):
-        recompute_results(copy, 1, "")
+        recompute_here(copy, 1, "")
     before = (copy / "trials.csv").read_bytes()
     for trace in (copy / "traces").iterdir():
         trace.unlink()
     with pytest.raises(DikbenchError, match=r"no traces in .*: they were not kept"):
-        recompute_results(copy, 1, "")
+        recompute_here(copy, 1, "")
     assert (copy / "trials.csv").read_bytes() == before
     changed(copy, "UPDATE meta SET value = '99' WHERE key = 'schema'")
     with pytest.raises(DikbenchError, match="schema version '99' is not known"):
-        recompute_results(copy, 1, "")
+        recompute_here(copy, 1, "")

@@ -8,13 +8,14 @@ import numpy as np
 import pandas as pd
 import pinocchio as pin
 import pytest
+from makers.runs import run_here
 
 from dikbench.plugins.building import make_scenario
 from dikbench.problem.tasks import PositionTask
 from dikbench.results.reading import read_results
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.loading import load_robot
-from dikbench.run.runner import RunSettings, run_study
+from dikbench.run.runner import RunSettings
 from dikbench.run.trial_row import run_trial
 from dikbench.scenario.oracle import ORACLE, follow, joint_oracle, oracle_motion, solve_placement
 from dikbench.scenario.reference.curves import circle
@@ -73,7 +74,7 @@ def test_a_study_runs_the_oracle_once_per_scenario_and_seed(tmp_path: Path) -> N
         ("ideal", "time", 0),
         ("ideal", "time", 1),
     ]
-    run_study(study, tmp_path / "out", RunSettings(jobs=1), "test")
+    run_here(study, tmp_path / "out", RunSettings(jobs=1), "test")
     trials = read_results(tmp_path / "out").trials
     assert (trials["status"] == "ok").all()
     times = pd.read_csv(tmp_path / "out" / "timing.csv")

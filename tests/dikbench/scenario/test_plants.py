@@ -22,6 +22,8 @@ from dikbench.scenario.plant import PLANTS, Ideal, Plant, Protective, Saturating
 REACH = make_scenario("reach")
 """A Panda, whose v0 is made different from 0 here."""
 
+PLANAR = make_scenario("reach[robot=planar3r]")
+
 
 def _scenario(**limits: Any) -> Scenario:
     robot = REACH.robot.with_limits(**limits)
@@ -42,7 +44,7 @@ def _commands(count: int, size: float = 1.0) -> list[Array]:
 def test_the_saturating_plant_goes_no_further_out(v: Array, q: Array, dt: float) -> None:
     """Inside it ends inside, outside it goes no further out, and no joint waits for another."""
     limits = load_robot("planar3r").with_limits(position=1.0, velocity=2.0).limits.at(q)
-    applied = Saturating().drive(v, limits, dt)
+    applied = Saturating().drive(v, np.zeros(3), limits, dt)
     after = q + applied * dt
     assert np.all(np.abs(applied) <= 2.0)
     assert np.all(np.abs(after) <= np.maximum(1.0, np.abs(q)) + 1e-12)
@@ -52,12 +54,43 @@ def test_the_saturating_plant_goes_no_further_out(v: Array, q: Array, dt: float)
         assert applied[j] == pytest.approx(expected, abs=1e-12)
 
 
+@given(
+    commands=arrays(float, (30, 3), elements=st.floats(-20, 20)),
+    delay=st.integers(0, 3),
+    dt=st.floats(1e-3, 0.1),
+)
+def test_the_saturating_plant_keeps_accelerations_where_they_are_in_force(
+    commands: Array, delay: int, dt: float
+) -> None:
+    """From the start on; at an end stop alone a joint brakes harder, and none starts faster."""
+    robot = PLANAR.robot.with_limits(position=1.0, velocity=2.0, acceleration=5.0)
+    scenario = replace(PLANAR, robot=robot, q0=np.zeros(3), v0=np.array([1.0, 0.0, -2.0]), dt=dt)
+    started, q, before = Saturating(delay=delay).start(scenario, 0), scenario.q0, scenario.v0
+    for command in commands:
+        applied = started.apply(read_only(command), robot.limits.at(q))
+        q = q + applied * dt
+        too_fast = np.abs(applied - before) > 5.0 * dt * (1 + 1e-9) + 1e-12
+        at_stop = np.abs(np.abs(q) - 1.0) < 1e-9
+        assert np.all(at_stop[too_fast])
+        assert np.all(np.abs(applied[too_fast]) < np.abs(before[too_fast]))
+        assert np.all(np.abs(applied) <= 2.0)
+        before = applied
+
+
+def test_the_saturating_plant_clips_to_the_acceleration_and_no_further() -> None:
+    """What may be had of a command is had: 5 rad/s^2 for 0.1 s, from the last velocity on."""
+    robot = load_robot("planar3r").with_limits(position=None, velocity=2.0, acceleration=5.0)
+    limits, before = robot.limits.at(robot.q0), np.array([1.0, -1.0, 1.8])
+    applied = Saturating().drive(np.array([1.2, 9.0, 9.0]), before, limits, 0.1)
+    assert applied == pytest.approx([1.2, -0.5, 2.0])
+
+
 def test_without_limits_the_saturating_plant_is_ideal() -> None:
     """Nothing in force clips nothing."""
     free = load_robot("planar3r").with_limits(position=None, velocity=None)
     limits: Limits = free.limits.at(free.q0)
     v = np.array([1e3, -1e3, 0.0])
-    assert np.array_equal(Saturating().drive(v, limits, 0.01), v)
+    assert np.array_equal(Saturating().drive(v, v, limits, 0.01), v)
     assert PLANTS == {"ideal": Ideal, "saturating": Saturating, "protective": Protective}
 
 
@@ -144,7 +177,7 @@ class Weak(Plant):
 
     share: float = 0.5
 
-    def drive(self, v: Array, limits: Limits, dt: float) -> Array:
+    def drive(self, v: Array, v_before: Array, limits: Limits, dt: float) -> Array:
         """See `Plant`."""
         return self.share * v
 

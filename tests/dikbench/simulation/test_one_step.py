@@ -8,8 +8,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from dikbench import DikbenchError, PostureTask, Status, load_robot, solve_dik
+from dikbench import DikbenchError, PositionTask, PostureTask, Status, load_robot, solve_dik
 from dikbench.arrays import Array
+from dikbench.problem import Task
 
 NAN = float("nan")
 LP = "lp-alpha[braking=one-step,regularization=0]"
@@ -137,6 +138,43 @@ def test_target_with_a_posture_task() -> None:
     assert gained @ np.full(7, 0.1) > 1e-3  # towards the posture
 
 
+def test_the_weight_of_the_target_is_that_of_its_task() -> None:
+    """Against a posture of weight 1, with P = J^T W J + I: v = P^-1 (J^T W V + v_posture)."""
+    twist, W = np.array([0.02, 0.01, 0, 0, 0, 0.03]), np.array([1.0, 2, 3, 4, 5, 6])
+    posture = PostureTask(PANDA.q0 + 0.01, priority=1)
+    J = pin.computeFrameJacobian(
+        PANDA.model, PANDA.model.createData(), PANDA.q0, PANDA.frame_id, pin.LOCAL
+    )
+    expected = np.linalg.solve(J.T @ (W[:, None] * J) + np.eye(7), J.T @ (W * twist) + 0.01)
+    formulation = "qp[damping=0]"
+    answer = solve_dik(
+        PANDA, PANDA.q0, formulation=formulation, twist=twist, weight=list(W), tasks=[posture]
+    )
+    np.testing.assert_allclose(answer.velocity, expected, atol=1e-7)
+
+
+@pytest.mark.parametrize("formulation", ["hqp", "sns", "nullspace"])
+def test_tasks_come_in_any_order_and_the_twist_has_a_priority(formulation: str) -> None:
+    """An elbow of the first priority moves as it wants, the twist below it in what is left."""
+    frame = "panda_link4"
+    aside = placement(PANDA.q0, frame).translation + np.array([0.0, 0.001, 0.0])
+    elbow = PositionTask(target=aside, frame=frame, priority=1)
+    posture = PostureTask(PANDA.q0, priority=3)
+    twist = np.array([0.02, 0.01, 0, 0, 0, 0])
+    arguments: dict[str, Any] = {"formulation": formulation, "twist": twist, "priority": 2}
+    orders: tuple[list[Task], ...] = ([elbow, posture], [posture, elbow])
+    answers = [solve_dik(PANDA, PANDA.q0, tasks=tasks, **arguments) for tasks in orders]
+    np.testing.assert_allclose(answers[0].velocity, answers[1].velocity, atol=1e-12)
+    v, model = answers[0].velocity, PANDA.model
+    data, index = model.createData(), model.getFrameId(frame)
+    J_1 = pin.computeFrameJacobian(model, data, PANDA.q0, index, pin.LOCAL_WORLD_ALIGNED)[:3]
+    np.testing.assert_allclose(J_1 @ v, [0.0, 0.001, 0.0], atol=1e-6)
+    J_2 = pin.computeFrameJacobian(model, data, PANDA.q0, PANDA.frame_id, pin.LOCAL)
+    N = np.eye(7) - np.linalg.pinv(J_1, rcond=1e-6) @ J_1
+    missing = J_2 @ v - twist  # no motion that keeps the elbow's makes it smaller
+    np.testing.assert_allclose((J_2 @ N).T @ missing, 0.0, atol=1e-4)
+
+
 @pytest.mark.parametrize("formulation", ["qp", "lp-alpha"])
 @pytest.mark.parametrize("side", ["lower", "upper"])
 @pytest.mark.parametrize("joint", range(7))
@@ -223,6 +261,17 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
         {"twist": None, "target": pin.SE3(np.eye(3), np.full(3, NAN))},
         "target: expected finite",
     ),
+    "reference frame of a target": (
+        {"twist": None, "target": pin.SE3.Identity(), "reference_frame": "WORLD"},
+        "reference_frame: belongs to a twist",
+    ),
+    "negative weight": ({"weight": -1.0}, "twist: weight: expected a number or 6 numbers"),
+    "five weights": ({"weight": [1.0] * 5}, "twist: weight: expected a number or 6 numbers"),
+    "priority of zero": ({"priority": 0}, "priority: expected 1"),
+    "priority that is not looked at": (
+        {"priority": 2, "tasks": [PostureTask(PANDA.q0, priority=1)]},
+        "DampedLeastSquares: does not look at tasks below the first priority",
+    ),
     "gain of a twist": ({"gain": 1.0}, "gain: belongs to a target"),
     "gain of zero": ({"twist": None, "target": pin.SE3.Identity(), "gain": 0}, "positive"),
     "NaN gain": ({"twist": None, "target": pin.SE3.Identity(), "gain": NAN}, "positive"),
@@ -277,8 +326,8 @@ def test_a_law_that_breaks_is_one_line(tmp_path: Any) -> None:
         solve_dik(PANDA, PANDA.q0, formulation=f"{file}:Broken", twist=TWIST)
 
 
-def placement(q: Array) -> Any:
-    """Placement of the Panda's task frame in the world."""
+def placement(q: Array, frame: str = PANDA.frame) -> Any:
+    """Placement of a frame of the Panda in the world."""
     data = PANDA.model.createData()
     pin.framesForwardKinematics(PANDA.model, data, q)
-    return data.oMf[PANDA.model.getFrameId(PANDA.frame)].copy()
+    return data.oMf[PANDA.model.getFrameId(frame)].copy()

@@ -1,4 +1,4 @@
-"""Bootstrap intervals over families, scenarios and seeds."""
+"""Bootstrap intervals over levels: families, robots, scenarios and seeds."""
 
 from __future__ import annotations
 
@@ -57,20 +57,23 @@ def test_a_flat_sample_gives_the_percentile_interval_of_scipy() -> None:
 
 def test_weights_are_those_of_drawing_step_by_step() -> None:
     """Means and covariances of the weights of an unbalanced tree, against naive drawing."""
-    families = ["a", "a", "a", "b", "b", "c"]
-    scenarios = ["a1", "a1", "a2", "b1", "b1", "c1"]
-    tree = {"a": [[0, 1], [2]], "b": [[3, 4]], "c": [[5]]}
+    families = ["a", "a", "a", "a", "b", "b", "c"]
+    robots = ["a1", "a1", "a1", "a2", "b1", "b1", "c1"]
+    scenarios = ["x", "x", "y", "z", "x", "x", "x"]
+    tree = [[[[0, 1], [2]], [[3]]], [[[4, 5]]], [[[6]]]]
     random = np.random.default_rng(3)
-    naive = np.zeros((20_000, 6))
+    naive = np.zeros((10_000, 7))
     for weights in naive:
-        for family in random.choice(list(tree), 3):
-            members = tree[family]
-            for scenario in random.integers(len(members), size=len(members)):
-                places = members[scenario]
-                np.add.at(weights, random.choice(places, len(places)), 1.0)
-    ours = draw_weights(families, scenarios, resamples=20_000)
-    np.testing.assert_allclose(ours.mean(axis=0), naive.mean(axis=0), atol=0.05)
-    np.testing.assert_allclose(np.cov(ours.T), np.cov(naive.T), atol=0.12)
+        for family in random.integers(3, size=3):
+            of_family = tree[family]
+            for robot in random.integers(len(of_family), size=len(of_family)):
+                of_robot = of_family[robot]
+                for scenario in random.integers(len(of_robot), size=len(of_robot)):
+                    places = of_robot[scenario]
+                    np.add.at(weights, random.choice(places, len(places)), 1.0)
+    ours = draw_weights(families, robots, scenarios, resamples=20_000)
+    np.testing.assert_allclose(ours.mean(axis=0), naive.mean(axis=0), atol=0.06)
+    np.testing.assert_allclose(np.cov(ours.T), np.cov(naive.T), atol=0.2)
 
 
 def test_the_same_seed_gives_the_same_interval() -> None:

@@ -80,5 +80,5 @@ def test_an_unknown_split_lists_the_valid_ones(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     head = 'description = "x"\nscenarios = ["reach"]\nsplit = "tune"\n'
     file.write_text(head + '[[cells]]\nformulations = ["pinv"]')
-    with pytest.raises(DikbenchError, match="valid: train, test"):
+    with pytest.raises(DikbenchError, match='valid: "train" or "test"'):
         load_study(str(file))

@@ -5,18 +5,21 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from msgspec.structs import replace
+from msgspec.structs import fields, replace
 
-from dikbench.cli.listing import description
+from dikbench.cli.describing import description
 from dikbench.errors import DikbenchError
 from dikbench.plugins.finding import plugins
 from dikbench.scenario.oracle import ORACLES
 from dikbench.selector import parse_selector
 from dikbench.solvers.catalogue.back_ends import parse_solver
+from dikbench.study.explained import VALID
 from dikbench.study.plan import expand
 from dikbench.study.study import (
+    Cells,
     Selection,
     Study,
+    TimingSettings,
     folder_of,
     load_study,
     select,
@@ -138,20 +141,33 @@ def test_selectors_stand_in_the_trial_as_they_were_given() -> None:
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        (("scenarios", "scenarioss"), ("scenarioss", "valid keys", "scenarios")),
-        (('["reach"]', '"reach"'), ("array", "scenarios")),
-        (('["reach"]', "[]"), ("scenarios",)),
-        (('["reach"]', "[1]"), ("str", "scenarios")),
-        (("formulations", "formulation"), ("formulation", "valid keys", "solvers")),
+        (("scenarios", "scenarioss"), ("scenarioss", "did you mean 'scenarios'", "valid: ")),
+        (('["reach"]', '"reach"'), ("scenarios is a text; valid: a list of scenarios",)),
+        (('["reach"]', "[]"), ("scenarios is empty; valid: a list of scenarios",)),
+        (('["reach"]', "[1]"), ("scenarios[0] is a whole number; valid: a list of",)),
+        (
+            ("formulations", "formulation"),
+            ("'formulation' of [cells]", "did you mean 'formulations'?", "solvers"),
+        ),
         (('"dls"', '"dlss"'), ("dlss", "did you mean 'dls'")),
         (('"dls"', '"dls[damp=1]"'), ("damp", "valid: damping")),
         (('"reach"', '"reech"'), ("reech", "did you mean 'reach'")),
         (('"reach"', '"reach[distance=7]"'), ("distance=7", "must be 0.01 to 0.3")),
         (('"reach"', '"reach[robot=ur55]"'), ("ur55", "did you mean 'ur5'")),
-        (("description", "seeds = [-1]\ndescription"), ("seeds",)),
+        (
+            ("description", "seeds = [-1]\ndescription"),
+            ("seeds[0] is too small; valid: a list of",),
+        ),
         (("description", 'plants = ["perfect"]\ndescription'), ("perfect", "plant")),
-        (("description", "timing = 3\ndescription"), ("timing",)),
-        (("description", "description = 3 #"), ("str", "description")),
+        (("description", "timing = 3\ndescription"), ("timing is a whole number; valid: a sec",)),
+        (("description", "description = 3 #"), ("description is a whole number; valid: a text",)),
+        (
+            ("description", 'split = "dev"\ndescription'),
+            ("split = 'dev' is not valid; valid: \"tr",),
+        ),
+        (("[[cells]]", "[cells]"), ("cells is a section; valid: tables [[cells]], each with",)),
+        (('formulations = ["dls"]', "solvers = []"), ("cells[0].formulations is missing; valid",)),
+        (('scenarios = ["reach"]', ""), ("scenarios is missing; valid: a list of scenarios",)),
         (("description", ""), ("TOML",)),
     ],
 )
@@ -163,8 +179,52 @@ def test_a_malformed_study_is_one_line_that_says_what_and_where(
     with pytest.raises(DikbenchError) as caught:
         expand(load_study(path))
     assert "\n" not in str(caught.value)
+    assert f"study {Path(path).stem}" in str(caught.value).replace(str(Path(path).parent) + "/", "")
     for part in expected:
         assert part in str(caught.value)
+
+
+_WRONG = ("3", "2.5", "true", "2020-01-01", "[[]]", "{x = 1}", '"x"', "[]", "[-1]", '["x"]')
+
+
+@pytest.mark.parametrize("key", VALID)
+def test_no_key_of_a_study_is_refused_in_the_words_of_a_library(
+    write_study: WriteStudy, key: str
+) -> None:
+    """Whatever stands behind a key: it is named, with what is valid, in one line."""
+    section, _, name = key.rpartition(".")
+    whole = {
+        "": 'scenarios = ["reach"]\ndescription = "x"\n[[cells]]\nformulations = ["dls"]\n',
+        "cells": '[[cells]]\nformulations = ["dls"]\n',
+        "timing": '[timing]\nreference = "dls"\n',
+    }
+    refused = 0
+    for value in _WRONG:
+        lines = [line for line in whole[section].splitlines() if not line.startswith(f"{name} =")]
+        place = 1 if section else 0
+        text = "\n".join([*lines[:place], f"{name} = {value}", *lines[place:]])
+        if key == "cells":
+            text = text.partition("[[cells]]")[0]
+        base = 'description = "x"\nscenarios = ["reach"]\n' if section else ""
+        cells = '[[cells]]\nformulations = ["dls"]\n' if section == "timing" else ""
+        try:
+            load_study(write_study(base + cells + text))
+        except DikbenchError as error:
+            said = str(error)
+            refused += 1
+            assert "\n" not in said
+            assert not re.search(r"\$\.|Expected|Object|array|got `", said), said
+            assert name in said, said
+            assert "valid" in said or "did you mean" in said, said
+    assert refused >= 4
+
+
+def test_every_key_says_what_is_valid() -> None:
+    """Those of the study and of its sections."""
+    keys = {field.name for field in fields(Study)}
+    keys |= {f"cells.{field.name}" for field in fields(Cells)}
+    keys |= {f"timing.{field.name}" for field in fields(TimingSettings)}
+    assert set(VALID) == keys
 
 
 def test_a_study_that_is_not_there_names_the_shipped_ones() -> None:

@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
+from makers.scenarios import planar_scenario
 
 from dikbench import load_robot, solve_dik
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_formulation
-from dikbench.problem import DikProblem, PositionTask, PostureTask, ProblemPart, Solve
+from dikbench.problem import (
+    DikProblem,
+    OrientationTask,
+    PositionTask,
+    PostureTask,
+    ProblemPart,
+    Solve,
+    TorqueConstraint,
+)
 from dikbench.problem.problem import refusal_of, sees_constraints, sees_lower_tasks, sight_of
 from dikbench.run.trial_row import run_trial
 from dikbench.study.trial import Trial
@@ -118,10 +127,33 @@ def test_a_trial_that_is_refused_is_skipped_with_the_reason() -> None:
     assert "not of several tasks" in row["message"]
 
 
+def test_constraints_that_are_not_looked_at_are_refused() -> None:
+    """At the prompt by an error, in a study by a skipped cell; who sees them is asked."""
+    robot = load_robot("ur5").with_limits(effort=load_robot("ur5").available_effort)
+    arguments: dict[str, Any] = {"twist": [0.1, 0, 0, 0, 0, 0], "constraints": [TorqueConstraint()]}
+    with pytest.raises(DikbenchError, match="DampedLeastSquares: does not look at constraints"):
+        solve_dik(robot, robot.q0, formulation="dls", **arguments)
+    assert solve_dik(robot, robot.q0, formulation="qp", **arguments).status.value == "ok"
+    row = run_trial(Trial.of("dls", "torque-limited[robot=ur5]", "none"))
+    assert (row["status"], row["steps"], row["sees_constraints"]) == ("skipped", 0, False)
+    assert "does not look at constraints" in row["message"]
+
+
+def test_no_formulation_is_blamed_for_a_target_that_is_none(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A scenario whose task cannot be posed is skipped with the reason."""
+    mirrored = OrientationTask(target=-np.eye(3), priority=2)
+    wrong = replace(planar_scenario(), tasks=(mirrored,))
+    monkeypatch.setattr("dikbench.run.trial_row.scenario_of", lambda selector, seed: wrong)
+    row = run_trial(Trial.of("dls", "near-miss", "none"))
+    assert (row["status"], row["steps"]) == ("skipped", 0)
+    assert "is not a rotation" in row["message"]
+
+
 @pytest.mark.parametrize(
     ("formulation", "solver", "scenario", "constraints", "lower"),
     [
-        ("dls", "none", "torque-limited[robot=ur5]", False, None),
         ("qp", "daqp", "obstacle[robot=ur5]", True, None),
         ("dls", "none", "near-miss", None, None),
         ("dls", "none", "reach[robot=panda]", None, False),

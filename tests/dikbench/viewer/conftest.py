@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from makers.runs import run_here
 from makers.shared import made_once
 
-from dikbench.run.runner import RunSettings, run_study
+from dikbench.run.runner import RunSettings
 from dikbench.study.study import Cells, Study
 
 STUDY = Study(
@@ -28,5 +29,5 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made_once(
         tmp_path_factory,
         "viewer",
-        lambda folder: run_study(STUDY, folder / "runs" / "viewed", RunSettings(jobs=1), "a test"),
+        lambda folder: run_here(STUDY, folder / "runs" / "viewed", RunSettings(jobs=1), "a test"),
     )

@@ -10,11 +10,13 @@ import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner, Result
+from makers.rows import make_rows, write_results
+from makers.runs import run_here
 
 from dikbench.cli import commands
 from dikbench.metrics import METRICS
 from dikbench.report.comparison.comparison import compare
-from dikbench.run.runner import RunSettings, run_study
+from dikbench.run.runner import RunSettings
 from dikbench.study.study import Cells, Study
 
 COMMITTED = Path(__file__).parents[4] / "results" / "quick"
@@ -45,7 +47,7 @@ def test_a_folder_does_not_differ_from_itself() -> None:
 def test_a_store_does_not_differ_from_its_exports(tmp_path: Path) -> None:
     """A real run against its own CSV file, without store and traces: not a bit is lost."""
     study = Study("a test", (Cells(("dls", "pinv")),), ("reach[duration=0.2]",), name="tiny")
-    run_study(study, tmp_path / "a", RunSettings(jobs=1), "a test")
+    run_here(study, tmp_path / "a", RunSettings(jobs=1), "a test")
     (tmp_path / "b").mkdir()
     for name in ("trials.csv", "manifest.json"):
         shutil.copy(tmp_path / "a" / name, tmp_path / "b")
@@ -245,3 +247,10 @@ def test_what_cannot_be_compared(folder: Callable[..., Path], tmp_path: Path) ->
         f"error: file {tmp_path / 'x.txt'}: valid endings: .md, .csv\n",
     )
     assert dikbench(a, a, "--out", tmp_path / "missing" / "x.md").exit_code == 2
+
+
+def test_cells_that_both_skipped_are_no_trials_in_both(tmp_path: Path) -> None:
+    """They are counted apart."""
+    rows = make_rows({"a": {}, "b": {"status": "skipped", "outcome": ""}}, ("reach", "step"))
+    said = dikbench(write_results(tmp_path / "a", rows), tmp_path / "a").output
+    assert "2 trials in both, of which 2 ended ok in both. 2 cells skipped in both." in said

@@ -4,12 +4,14 @@ import re
 from pathlib import Path
 
 import pytest
-from makers.rows import make_rows
+from makers.rows import make_rows, write_results
 
 from dikbench.plugins.building import make_scenario
 from dikbench.plugins.finding import plugins
+from dikbench.report.contents.contents import gather
 from dikbench.report.contents.docstring import parse_docstring
 from dikbench.report.contents.formulations_and_families import families_of, formulations_of
+from dikbench.results.reading import read_results, without_attributes
 from dikbench.scenario.situation import Situation
 
 FORMULATION = '''
@@ -134,3 +136,14 @@ def test_scenarios_are_what_their_joint_motion_asks_for(
 ) -> None:
     """The situation is measured and not read off a name: a wide miss is free space."""
     assert make_scenario(scenario).situation == situation
+
+
+def test_skipped_cells_are_no_trials_of_the_heading(tmp_path: Path) -> None:
+    """They are counted apart; what failed was run."""
+    rows = make_rows(
+        {"pinv": {}, "dls": {"status": ["crashed", "skipped"], "outcome": ["did-not-run", ""]}},
+        ("reach", "near-miss"),
+    )
+    folder = write_results(tmp_path / "out", rows)
+    contents = gather(without_attributes(read_results(folder, lenient=True)), ())
+    assert contents.counts[:3] == [(3, "trials run"), (1, "failed"), (1, "cell skipped")]

@@ -72,6 +72,22 @@ def test_a_failed_trial_is_black_and_a_missing_one_blank(drawn: list[Any], targe
     assert cells(drawn[2].axes[0])[0, 0] == len(CATEGORIES) - 1
 
 
+def test_who_stands_still_has_cells_like_others(drawn: list[Any], target: Path) -> None:
+    """A peak speed and an error of 0 have no logarithm; they are drawn and written as 0."""
+    trials = random_rows(["idle", "pinv"], GRID)
+    idle = trials["formulation"].eq("idle")
+    trials.loc[idle, ["velocity_peak_ratio", "contour_error_rms_m"]] = 0.0
+    with style():
+        draw_phase_diagrams(trials, target)
+    for figure in drawn[:2]:
+        [axis] = [axis for axis in figure.axes if axis.get_title() == "idle"]
+        mesh = next(artist for artist in axis.collections if isinstance(artist, QuadMesh))
+        colours = mesh.to_rgba(cells(axis))
+        assert (colours[..., 3] == 1).all()  # a masked value is transparent
+        assert [text.get_text() for text in axis.texts] == ["0"] * len(GRID)
+        assert {text.get_color() for text in axis.texts} == {"black"}
+
+
 def test_laws_stand_in_the_order_of_how_they_do(drawn: list[Any], target: Path) -> None:
     """The oracle first, a law that keeps the limits before one that does not, then by the error."""
     trials = random_rows(["violating", "far", "near", "oracle"], GRID)

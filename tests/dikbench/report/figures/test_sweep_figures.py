@@ -111,7 +111,7 @@ def test_a_law_sweep_takes_success_the_median_error_and_the_worst_speed(
         np.testing.assert_allclose(curve.get_xdata(), [0.0, 1.0, 2.0])
 
 
-@pytest.mark.parametrize("count", [1, 13, 25])
+@pytest.mark.parametrize("count", [1, pytest.param(13, marks=pytest.mark.long), 25])
 def test_any_number_of_laws_is_drawn(target: Path, count: int) -> None:
     """One formulation, a dozen and one more than a page holds, each page below 200 kB."""
     names = [f"a-formulation-with-a-rather-long-name-{number}[gain=1]" for number in range(count)]

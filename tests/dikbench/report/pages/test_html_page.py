@@ -63,14 +63,17 @@ class Page(HTMLParser):
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a report on two plants, with a failure, unstable times and a hostile law."""
     folder = tmp_path_factory.mktemp("report") / "out"
-    scenarios = ("reach", "near-miss[miss=0.02]", f"near-miss[robot={HOSTILE.replace('`', '')}]")
+    scenarios = (
+        "reach", "near-miss[miss=0.02]", f"near-miss[robot={HOSTILE.replace('`', '')}]",
+        "near-miss[miss=0.05]", "near-miss[miss=0.2]",
+    )  # fmt: skip
     times = {
         "formulation_time_median_us": 10.0,
         "formulation_time_p99_us": 12.0,
         "timing_stability": "stable",
     }
     formulations: dict[str | tuple[str, str], Values] = {
-        "pinv": {"outcome": ["success", "late", "left-path"], **times},
+        "pinv": {"outcome": ["success", "late", "left-path", "late", "late"], **times},
         "dls[damping=0.1]": {"position_error_rms_m": 0.02, **times, "timing_stability": "drift"},
         ("qp", "daqp"): {
             "position_error_rms_m": 1e-5,
@@ -79,8 +82,8 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
             "disagreed_share": 0.1,
         },
         HOSTILE: {
-            "status": ["ok", "formulation-error", "ok"],
-            "outcome": ["success", "did-not-run", "success"],
+            "status": ["ok", "formulation-error", "ok", "ok", "ok"],
+            "outcome": ["success", "did-not-run", "success", "success", "success"],
             "message": f"RuntimeError: {HOSTILE}",
         },
     }

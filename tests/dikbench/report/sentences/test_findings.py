@@ -105,9 +105,31 @@ def test_the_most_accurate_of_the_first_is_named_with_its_distance() -> None:
     said = most_accurate(rows, found, Names(rows))
     assert said is not None
     assert said.text == (
-        "of these `a`, 1 mm from the path at most (medians of 24 cases that all of them did; "
-        "angles count with 0.2 m); next is `b`, 3 times as far (geometric mean)."
+        "of these `a`, 1 mm from the path at most; next is `b`, 3 times as far as the nearest "
+        "(geometric means, paired over the 24 cases that all of the first did; less than 0.01 mm "
+        "counts as 0.01 mm, angles with 0.2 m)."
     )
+
+
+def test_distances_are_geometric_means_of_the_same_cases_as_the_ratio() -> None:
+    """1 and 4 mm by turns are 2 mm, not a median; 0 counts as 0.01 mm; who fails leaves a case."""
+    near = [1e-3, 4e-3] * 12
+    far = [8e-3, 2e-3] * 12
+    rows = _rows({"a": {"contour_error_6d_max_m": near}, "b": {"contour_error_6d_max_m": far}})
+    found = leaders(rows, "path", _all(rows), Names(rows))
+    assert found is not None
+    assert most_accurate(rows, found, Names(rows)) is None  # by turns: not told apart
+    twice = [2 * value for value in near]
+    rows = _rows({"a": {"contour_error_6d_max_m": near}, "b": {"contour_error_6d_max_m": twice}})
+    said = most_accurate(rows, found, Names(rows))
+    assert said is not None
+    assert "`a`, 2 mm from the path at most; next is `b`, 2 times as far" in said.text
+    rows = _rows({"a": {"contour_error_6d_max_m": 0.0}, "b": {"contour_error_6d_max_m": 1e-4}})
+    rows.loc[rows["scenario"].eq("family0[k=0]") & rows["formulation"].eq("a"), "outcome"] = "late"
+    said = most_accurate(rows, found, Names(rows))
+    assert said is not None
+    assert "`a`, 0.01 mm from the path at most; next is `b`, 10 times as far" in said.text
+    assert "over the 23 cases" in said.text
 
 
 def test_distances_that_hardly_differ_are_not_ranked() -> None:

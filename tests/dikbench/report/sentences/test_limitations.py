@@ -51,7 +51,8 @@ def test_one_seed_no_times_and_one_way_of_running_are_said() -> None:
     """More seeds, times and the other plant and reference mode take their sentences away."""
     one = make_rows({"pinv": {}})
     for sentence in (
-        "There is one seed (0)", "No times were taken", "moved on with the clock",
+        "There is one seed (0)", "No timing pass was made: `dikbench time`",
+        "moved on with the clock",
         "The plant `saturating`.", "The reference `path`.", "The oracle, a measure", "A note.",
     ):  # fmt: skip
         assert sentence in told(one)
@@ -64,7 +65,7 @@ def test_one_seed_no_times_and_one_way_of_running_are_said() -> None:
     everything = told(pd.concat(more))
     for sentence in (
         "one seed",
-        "No times",
+        "No timing pass",
         "with the clock",
         "The plant `saturating",
         "The reference `",

@@ -37,7 +37,17 @@ def test_columns_and_formulations_are_chosen_in_the_order_given(folder: Path) ->
     assert [cell.strip() for cell in lines[2].split("|")[1:-1]] == [
         "formulation", "solver", "trials", "free space",
     ]  # fmt: skip
-    assert [line.split("|")[1].strip() for line in lines[4:]] == ["lp", "dls[damping=0.1,gain=2]"]
+    assert [line.split("|")[1].strip() for line in lines[4:6]] == ["lp", "dls[damping=0.1,gain=2]"]
+    assert lines[-1] == "Too few cases for stars: free space (2 scenarios)."
+
+
+def test_a_table_without_rows_says_why(tmp_path: Path) -> None:
+    """And not that the formulations of the run are unknown."""
+    nothing_known = make_rows({"dls": {"feasible": "unknown"}})
+    folder = write_results(tmp_path / "out", nothing_known)
+    answer = _table(str(folder), "--table", "success", "--formulations", "dls")
+    assert answer.exit_code == 2
+    assert "the table success has no rows: Nothing can be said of success" in answer.stderr
 
 
 def test_names_of_ones_own(folder: Path, tmp_path: Path) -> None:
@@ -61,8 +71,10 @@ def test_names_of_ones_own(folder: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "name", ["outcomes", "tracking_error", "limit_violation", "timing", "solvers"]
 )
-def test_every_table_can_be_had(folder: Path, name: str) -> None:
+def test_every_table_can_be_had(tmp_path: Path, name: str) -> None:
     """As LaTeX, which is the default."""
+    timed = {"formulation_time_median_us": 10.0, "timing_stability": "stable"}
+    folder = write_results(tmp_path / "out", make_rows({("lp", "daqp"): timed}))
     answer = _table(str(folder), "--table", name)
     assert answer.exit_code == 0, answer.output
     assert r"\begin{tabular}" in answer.output

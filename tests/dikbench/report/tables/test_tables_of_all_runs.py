@@ -16,8 +16,11 @@ from makers.recomputed import BROKEN, Row, contender, family, number
 from makers.rows import bare_rows, make_rows
 
 from dikbench.report.tables.build import make_table
+from dikbench.report.tables.console import to_text
 from dikbench.report.tables.csv_table import to_csv
 from dikbench.report.tables.kinds import KINDS, LIMIT_VIOLATION, TIMING, TRACKING_ERROR, TableKind
+from dikbench.report.tables.latex_table import to_latex
+from dikbench.report.tables.markdown import to_markdown
 from dikbench.report.tables.solver_axis import solver_axis
 from dikbench.report.tables.table import Block, Table, TableCell
 
@@ -194,6 +197,7 @@ def test_the_solver_axis_is_that_of_the_trials(folder: Path) -> None:
         judged = counted.get(contender(row), [])
         expected = {
             "runs": len(own),
+            "judged": len(judged),
             "success_percent": 100 * recomputed.rate(judged) if judged else math.nan,
             "without_answer_percent": share("solver_failed_share"),
             "not_verified_percent": share("not_verified_share"),
@@ -279,12 +283,25 @@ def test_nothing_to_show_is_a_table_without_blocks(status: list[str]) -> None:
         assert len(to_csv(table).splitlines()) == 1
 
 
+def test_without_a_timing_pass_the_table_says_so_and_how_to_make_it() -> None:
+    """Trials that ran without times are no empty rows; the command is named, in every form."""
+    table = make_table(TIMING, make_rows({"a": {}, "b": {}}))
+    assert table.blocks == ()
+    for text in (to_text(table), to_markdown(table), to_latex(table)):
+        assert text.count("No timing pass was made: ") == 1
+        assert "dikbench time" in text.replace("{-}", "-")
+    assert "tabular" not in to_latex(table)
+
+
 def test_solvers_without_success_or_times_have_empty_cells() -> None:
     """A formulation without a solver is no row; one that only crashed is one."""
     rows = make_rows({"a": {}, ("b", "s"): {"status": "crashed", "outcome": "did-not-run"}})
     rows.loc[rows["formulation"].eq("b"), ["steps", "primal_residual_max_rad_s"]] = [0, np.nan]
     [row] = solver_axis(rows).blocks[0].rows
     assert (row.formulation, row.solver) == ("b", "s")
-    assert [cell.value for cell in row.cells][:1] == [1.0]
+    assert [cell.value for cell in row.cells][:2] == [1.0, 0.0]
     assert math.isnan(row.cells[2].value)
+    table = solver_axis(rows)
+    assert not any("call" in table.columns[place].heading for place in table.shown)
+    assert any("No timing pass was made" in note for note in table.notes)
     assert solver_axis(make_rows({"a": {}})).blocks == ()

@@ -1,25 +1,18 @@
-"""Whether the parts of a scenario fit together: tasks, reference, start and exact motion."""
+"""Whether the parts of a scenario fit together: tasks, reference, start and exact motion.
+
+Where they do not, a run would measure something else than it says.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import ClassVar, Final
+from typing import Final
 
 import numpy as np
 import pinocchio as pin
 
-from dikbench.arrays import Array
-from dikbench.errors import DikbenchError
-from dikbench.problem.posing import pose_problem
-from dikbench.problem.problem import DikProblem, Solve
-from dikbench.programs.quadratic_program import ProgramKind, QuadraticProgram
 from dikbench.robots.kinematics import Kinematics
 from dikbench.scenario.scenario import Scenario
-from dikbench.simulation.control_step import TrialEnded, control_step
-from dikbench.simulation.status import Status
-from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, parse_solver
-from dikbench.solvers.checked_solve import make_solve
 
 LARGEST_ERROR: Final = 1e-6
 """The largest tracking error (m, rad) that an exact motion may leave."""
@@ -37,7 +30,6 @@ def misfits(scenario: Scenario) -> Iterator[str]:
     yield from _wrong_tasks(scenario)
     yield from _out_of_the_plane(scenario)
     yield from _off_the_reference(scenario)
-    yield from _no_first_step(scenario)
 
 
 def _wrong_sizes(scenario: Scenario) -> Iterator[str]:
@@ -125,38 +117,3 @@ def _off_the_reference(scenario: Scenario) -> Iterator[str]:
                 f"{LARGEST_ERROR:g}, as of exact_motion(robot, reference, q0, tracking)"
             )
             return
-
-
-@dataclass(frozen=True)
-class _LeastSquares:
-    """Do the first level as well as the limits and the rows G v <= h allow."""
-
-    program: ClassVar[ProgramKind] = "qp"
-
-    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
-        """See `Formulation`."""
-        P, p = problem.primary.normal_equations()
-        box = problem.box()
-        return solve(
-            QuadraticProgram(
-                P + 1e-6 * np.eye(len(P)), -p, problem.G, problem.h, lb=box.lower, ub=box.upper
-            )
-        )
-
-
-def _no_first_step(scenario: Scenario) -> Iterator[str]:
-    """Pose the first control step and have it solved."""
-    kinematics = Kinematics(scenario.robot)
-    kinematics.update(scenario.q0)
-    solve = make_solve(parse_solver(DEFAULT_SOLVER["qp"]), "qp")
-    try:
-        task = scenario.tracking.linearize(kinematics, *scenario.target(0.0))
-        problem = pose_problem(
-            kinematics, scenario.v0, scenario.dt, task, scenario.tasks, scenario.constraints
-        )
-        answer = control_step(_LeastSquares(), problem, solve)
-    except (DikbenchError, TrialEnded) as error:
-        yield f"its first control step cannot be answered: {error}"
-        return
-    if answer.status is not Status.OK:
-        yield f"its first control step cannot be answered: {answer.status.sentence}"

@@ -1,0 +1,233 @@
+"""The descriptions of single things: formulations, families, solvers, plants, robots, ..."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+from math import isnan
+from pathlib import Path
+from types import MappingProxyType
+from typing import Final
+
+from dikbench.cli.listing import ORACLE_SUMMARIES, direction, plant_plugin
+from dikbench.cli.robot_in_words import ROBOT_FILES, robot_in_words
+from dikbench.errors import DikbenchError, unknown
+from dikbench.metrics import METRICS, OUTCOME_SENTENCES, Outcome
+from dikbench.plugins.building import make_formulation, make_plant, make_scenario
+from dikbench.plugins.finding import (
+    Plugin,
+    formulation_plugin,
+    in_file,
+    kind_in_file,
+    plugins,
+    scenario_plugin,
+)
+from dikbench.report.tables.every import tables_with
+from dikbench.robots.catalogue import ROBOTS
+from dikbench.scenario.oracle import ORACLES
+from dikbench.scenario.plant import PLANTS, REFERENCE_MODES
+from dikbench.scenario.scenario import Scenario
+from dikbench.selector import Selector, listed, parse_selector
+from dikbench.solvers.catalogue.back_ends import (
+    BACK_ENDS,
+    DEFAULT_SOLVER,
+    is_installed,
+    parse_solver,
+)
+from dikbench.solvers.catalogue.presets import TOLERANCES
+from dikbench.study.study import load_study, shipped_studies
+
+FEASIBLE: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "time": "a motion is known that keeps all limits by the clock",
+        "path": "a motion is known that keeps all limits if the path may wait",
+        "no": "there is a proof that no motion keeps all limits",
+        "unknown": "neither a motion is known nor a proof that there is none",
+    }
+)
+"""What the words of `feasible` mean."""
+
+
+def description(text: str) -> str:
+    """Describe one thing in full.
+
+    Raises:
+        DikbenchError: if nothing has this name, or a parameter of it is wrong.
+    """
+    selector = parse_selector(text)
+    name = selector.name
+    kind = kind_in_file(name) if in_file(name) else None
+    if kind == "formulation" or name in plugins("formulation"):
+        return _described(formulation_plugin(name), selector)
+    if kind == "scenario" or name in plugins("scenario"):
+        return _described(scenario_plugin(name), selector, scenario=True)
+    if name in BACK_ENDS:
+        return _solver(selector)
+    if name in PLANTS:
+        make_plant(selector)
+        return _plugin(plant_plugin(name), selector, "")
+    described = _without_parameters(name)
+    if selector.parameters:
+        raise DikbenchError(
+            f"{text}: {name} has no parameters; valid in brackets: those of a formulation, "
+            "scenario, solver or plant"
+        )
+    return described
+
+
+def _without_parameters(name: str) -> str:
+    if name in ORACLES:
+        return f"{name}: {ORACLE_SUMMARIES[name]}"
+    if name in ROBOTS or name.endswith(ROBOT_FILES):
+        return robot_in_words(name)
+    if name in METRICS:
+        return _metric(name)
+    if name in {outcome.value for outcome in Outcome}:
+        return f"{name}: {OUTCOME_SENTENCES[Outcome(name)]}"
+    if name in shipped_studies() or name.endswith(".toml"):
+        study = load_study(name)
+        path = shipped_studies().get(name, name)
+        return f"# {study.name} ({path})\n\n{Path(path).read_text(encoding='utf-8')}"
+    every = [*plugins("formulation"), *plugins("scenario"), *BACK_ENDS, *PLANTS, *ROBOTS, *METRICS]
+    raise unknown("name", name, [*every, *shipped_studies()], every="dikbench list")
+
+
+def _described(plugin: Plugin, selector: Selector, *, scenario: bool = False) -> str:
+    """Describe a formulation or a family; a scenario of it where all is given that must be."""
+    lacking = [p for p in plugin.parameters.values() if p.required]
+    lacking = [p for p in lacking if p.name not in selector.parameters]
+    further = []
+    if lacking:
+        given = {**selector.parameters, **{p.name: "..." for p in lacking}}
+        wanted = ", ".join(p.name for p in lacking)
+        further = ["", f"{wanted} must be given: {Selector(selector.name, given)}"]
+    elif scenario:
+        further = ["", *_difficulty(selector)]
+    else:
+        make_formulation(selector)
+    return "\n".join([_plugin(plugin, selector, "instances" if scenario else "tuned"), *further])
+
+
+def _plugin(plugin: Plugin, selector: Selector, drawn: str) -> str:
+    """Describe a plug-in by its docstring and parameters.
+
+    Args:
+        plugin: what is described.
+        selector: as it was named, with its values.
+        drawn: what the ranges are for in which parameters are drawn.
+    """
+    given = selector.parameters
+    values = {
+        p.name: f" = {given[p.name]} (default: {'none' if p.required else p.default})"
+        if p.name in given
+        else ""
+        if p.required
+        else f" = {p.default}"
+        for p in plugin.parameters.values()
+    }
+    parameters = [
+        f"  {p.name}{values[p.name]}: {p.valid}" + (f"  ({drawn}: {p.drawn})" if p.drawn else "")
+        for p in plugin.parameters.values()
+        if not p.hidden
+    ]
+    return "\n".join(
+        [
+            f"{plugin.name} ({plugin.file})",
+            "",
+            inspect.getdoc(plugin.factory) or "",
+            "",
+            "Parameters:",
+            *(parameters or ["  none"]),
+        ]
+    )
+
+
+def _difficulty(text: Selector) -> list[str]:
+    """Describe a scenario's certificate and what its exact joint motion asks of the robot."""
+    scenario = make_scenario(text)
+    lines = [f"Certificate of {text}:", *(f"  {claim}" for claim in scenario.certificate.claims)]
+    motion = scenario.motion
+    if motion is None:
+        still = "Its target is at rest: how to get to it is up to a formulation."
+        moves = scenario.reference.moving
+        lines += ["", "No joint motion follows its reference." if moves else still]
+    else:
+        sigma, margin, reach = motion.sigma_min, motion.margin, motion.reach
+        lines += [
+            "",
+            f"The exact joint motion, in {len(motion.instants)} samples "
+            f"({scenario.duration:.4g} s, {scenario.steps} control steps):",
+            f"  smallest singular value (m, rad): {sigma.min():.4g} to {sigma.max():.4g}",
+            f"  margin to the position limits [rad]: {margin.min():.4g} to {margin.max():.4g}",
+            f"  required speed over limit: up to {motion.peak_speed_ratio:.4g}",
+            f"  reach from the first joint [m]: {reach.min():.4g} to {reach.max():.4g}",
+        ]
+    return [*lines, "", *_verdict(scenario), "", f"A seed perturbs: {scenario.variation}."]
+
+
+def _verdict(scenario: Scenario) -> list[str]:
+    """Describe by what a scenario's trials are judged, what can be done of it, and the words."""
+    witness, until = scenario.witness, scenario.followable_until
+    feasible = f"{scenario.feasible}, {FEASIBLE[scenario.feasible]}"
+    if scenario.feasible == "path" and witness is not None:
+        feasible += f", {witness.lateness:.3g} s late"
+    if scenario.infeasible_because:
+        feasible += f": {scenario.infeasible_because}"
+    need = "not defined" if isnan(scenario.need) else f"{scenario.need:.4g}"
+    end = "its end can be reached" if scenario.comes_back else "its end cannot be reached"
+    return [
+        "How its trials are judged:",
+        f"  situation: {scenario.situation}",
+        f"  judged by: {'the whole path' if scenario.judged == 'path' else 'where it ends'}",
+        f"  tolerance [m]: {scenario.tolerance_m:g}",
+        f"  feasible: {feasible}",
+        f"  need (joint speed of the exact motion over its limit): {need}",
+        "  can be followed until: " + ("its end" if until is None else f"{until:.4g} s; {end}"),
+        "",
+        "What the words mean:",
+        *_meanings("feasible", FEASIBLE),
+        *_meanings("reference", REFERENCE_MODES),
+        *_meanings("outcome", {each.value: text for each, text in OUTCOME_SENTENCES.items()}),
+    ]
+
+
+def _meanings(of: str, words: Mapping[str, str]) -> list[str]:
+    return [f"  {of} {word}: {meaning}" for word, meaning in words.items()]
+
+
+def _solver(selector: Selector) -> str:
+    name, entry = selector.name, BACK_ENDS[selector.name]
+    if selector.parameters:
+        parse_solver(selector)
+    presets = ", ".join(f"{preset} {tolerance:g}" for preset, tolerance in TOLERANCES.items())
+    settings = ", ".join(f"{key} ({kind.__name__})" for key, kind in entry.settings.items())
+    return "\n".join(
+        [
+            f"{name}: {entry.summary}",
+            f"  package: {entry.package}, {'installed' if is_installed(name) else 'missing'}",
+            f"  interfaces: {', '.join(entry.interfaces)} (the first is the default)",
+            f"  linear programs: {entry.no_lp or 'yes'}",
+            f"  presets: {presets} (largest residual of a verified answer)",
+            f"  settings: {settings or 'none'}",
+            f"  then: another solver, asked where {name} gives no answer, as in {name}[then=...]",
+            *(
+                f"  the default of formulations with a program of kind {program}: {default}"
+                for program, default in DEFAULT_SOLVER.items()
+                if parse_selector(default).name == name
+            ),
+            *([f"  selected: {listed(selector.parameters)}"] if selector.parameters else []),
+        ]
+    )
+
+
+def _metric(name: str) -> str:
+    metric = METRICS[name]
+    tables = ", ".join(tables_with(name))
+    return "\n".join(
+        [
+            f"{name}: {metric.definition}",
+            f"  unit: {metric.unit or 'none'}; {direction(metric)}; worst value {metric.worst}",
+            f"  tables: {tables or 'none; a column of trials.csv'}",
+            f"  source: {metric.source.strip('[]')}",
+        ]
+    )

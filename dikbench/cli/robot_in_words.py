@@ -1,0 +1,126 @@
+"""The description of a robot: its joints, their limits, and its frames."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import Any, Final
+from xml.etree import ElementTree
+
+import numpy as np
+
+from dikbench.arrays import Array
+from dikbench.robots.catalogue import ROBOTS
+from dikbench.robots.limits import Interval
+from dikbench.robots.loading import load_robot
+from dikbench.robots.robot import Robot
+
+ROBOT_FILES: Final = (".urdf", ".xml")
+"""How the name of a robot's file ends."""
+
+WIDTH: Final = 100
+"""Characters of a line of frames."""
+
+
+def robot_in_words(name_or_urdf: str) -> str:
+    """Describe a robot of the catalogue or of a URDF file.
+
+    Raises:
+        DikbenchError: if there is no such robot, or its file cannot be read.
+    """
+    if name_or_urdf in ROBOTS:
+        robot, entry = load_robot(name_or_urdf), ROBOTS[name_or_urdf]
+        head = [f"{name_or_urdf}: {entry.summary}", f"  task frame: {robot.frame}"]
+        source = entry.acceleration_source
+    else:
+        robot = load_robot(name_or_urdf, _last_moved_link(name_or_urdf))
+        head = [f"{name_or_urdf}: a robot from a URDF; name its task frame with frame=..."]
+        source = "a URDF has none"
+    known = robot.available_acceleration is not None
+    return "\n".join(
+        [
+            *head,
+            f"  safe start [rad or m]: {np.round(robot.q0, 4).tolist()}",
+            f"  {robot.nv} velocities; joints with their limits, inf where there is none:",
+            *(f"    {line}" for line in _joints(robot)),
+            f"  acceleration limits{'' if known else ': none are known'} ({source})",
+            "  frames, each with the number of velocities that move it:",
+            *textwrap.wrap(
+                ", ".join(_frames(robot)), WIDTH, initial_indent="    ", subsequent_indent="    "
+            ),
+        ]
+    )
+
+
+def _last_moved_link(path: str) -> str | None:
+    """Find the link of a URDF that most joints move, the last of them; None where there is none.
+
+    Whatever else is wrong with a file is told where the robot is loaded.
+    """
+    try:
+        root = ElementTree.parse(path).getroot()
+    except (OSError, ElementTree.ParseError):
+        return None
+    above: dict[str, tuple[str, bool]] = {}
+    for joint in root.iter("joint"):
+        child, parent = joint.find("child"), joint.find("parent")
+        if child is not None and parent is not None:
+            moves = joint.get("type") != "fixed"
+            above[child.get("link", "")] = (parent.get("link", ""), moves)
+    best, most = None, 0
+    for link in above:
+        count, at, seen = 0, link, set[str]()
+        while at in above and at not in seen:
+            seen.add(at)
+            at, moves = above[at]
+            count += moves
+        if count >= max(most, 1):
+            best, most = link, count
+    return best
+
+
+def _joints(robot: Robot) -> list[str]:
+    limits, model = robot.limits, robot.model
+    named = [
+        (limits.position, "position", ("rad", "m")),
+        (limits.velocity, "speed", ("rad/s", "m/s")),
+        (_symmetric(robot.available_acceleration), "acceleration", ("rad/s^2", "m/s^2")),
+        (_symmetric(robot.available_effort), "torque or force", ("N m", "N")),
+    ]
+    lines, free = [], dict[int, str]()
+    for name, joint in [*zip(model.names, model.joints, strict=True)][1:]:
+        if joint.nv == 0:
+            lines.append(f"{name} follows {free[joint.idx_v]}")
+            continue
+        free[joint.idx_v] = name
+        slides = joint.nv == 1 and joint.shortname().startswith("JointModelP")
+        kind = "slides" if slides else "turns" if joint.nv == 1 else f"{joint.nv} velocities"
+        if joint.nv == 1 and joint.nq == 2:
+            kind = "turns without end"
+        parts = [
+            f"{what} {_range(interval, joint.idx_v, both=what == 'position')} {units[slides]}"
+            for interval, what, units in named
+            if interval is not None and joint.nv == 1
+        ]
+        lines.append(f"{name} ({joint.idx_v}): {'; '.join([kind, *parts])}")
+    return lines
+
+
+def _symmetric(magnitude: Array | None) -> Interval | None:
+    return None if magnitude is None else Interval(-magnitude, magnitude)
+
+
+def _range(interval: Interval, index: int, *, both: bool) -> str:
+    lower, upper = interval.lower[index], interval.upper[index]
+    return f"{lower:.4g} to {upper:.4g}" if both or lower != -upper else f"{upper:.4g}"
+
+
+def _frames(robot: Robot) -> list[str]:
+    """List the links and other frames in the order of the model."""
+    model: Any = robot.model
+    counts = {}
+    for frame in model.frames:
+        above = [model.joints[index] for index in model.supports[frame.parentJoint]][1:]
+        if frame.name != "universe":
+            moving = {joint.idx_v + k for joint in above for k in range(joint.nvExtended)}
+            counts[frame.name] = len(moving)
+    return [f"{name} ({count})" for name, count in counts.items()]

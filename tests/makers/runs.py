@@ -1,0 +1,51 @@
+"""Studies whose trials run in the process of the test: a worker takes a second to start."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dikbench.results.folder import ResultsFolder
+from dikbench.run import recompute, runner
+from dikbench.run.runner import RunSettings, run_study
+from dikbench.study.study import Study
+
+
+class _NoPool:
+    """What the harness asks of its pool of workers, done at once."""
+
+    def schedule(
+        self, function: Callable[..., Any], args: tuple[Any, ...] = (), timeout: float | None = None
+    ) -> Future[Any]:
+        """Call a function, and return its result or its error; nothing limits its time."""
+        done: Future[Any] = Future()
+        try:
+            done.set_result(function(*args))
+        except Exception as error:
+            done.set_exception(error)
+        return done
+
+
+@contextmanager
+def _no_workers(*given: object) -> Iterator[_NoPool]:
+    yield _NoPool()
+
+
+@contextmanager
+def without_workers() -> Iterator[None]:
+    """Have the harness run, time and recompute trials in this process meanwhile."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (runner, recompute):
+            patch.setattr(module, "workers", _no_workers)
+        yield
+
+
+def run_here(study: Study, out: Path, settings: RunSettings, command: str) -> ResultsFolder:
+    """Run a study as `run_study` does, without workers."""
+    with without_workers():
+        return run_study(study, out, settings, command)
