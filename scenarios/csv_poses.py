@@ -81,7 +81,8 @@ class CsvPoses(Family):
     run starts on the first pose, in the posture found from the robot's own start, or from `q0`. The
     certificate says what the file asks for, and at which line most: the speed of the target, joint
     speeds over their limits, and joint accelerations where limits are known, from one control step
-    to the next; it claims that every pose can be reached and that the start is inside the limits.
+    to the next (in runs of more than 2000 steps, over a 2000th of the run); it claims that every
+    pose can be reached and that the start is inside the limits.
 
     Obstacles are those of a TOML file with tables [[sphere]] (centre, radius), [[capsule]] (start,
     end, radius) and [[box]] (centre, size, rotation), in metres in the world; the start is claimed
