@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Annotated, Literal
@@ -13,12 +13,11 @@ import pinocchio as pin
 from dikbench.errors import DikbenchError
 from dikbench.problem import Array, CollisionConstraint, Drawn, Kinematics, Range, Robot, null_space
 from dikbench.scenario import (
-    BoxObstacle,
-    CapsuleObstacle,
     Case,
+    Certificate,
     Claim,
     Family,
-    Obstacle,
+    OracleMotion,
     Perturbation,
     Reference,
     SphereObstacle,
@@ -29,10 +28,19 @@ from dikbench.scenario import (
     joint_path,
     measure_motion,
     solve_placement,
+    usual_claims,
+)
+from scenarios.obstacle_placing import (
+    RADIUS_M,
+    SIDES,
+    Shape,
+    Side,
+    beside_hand,
+    obstacle_at,
+    point_velocity,
 )
 
 Where = Literal["hand", "elbow"]
-Shape = Literal["sphere", "capsule", "box"]
 
 
 @dataclass(frozen=True)
@@ -65,11 +73,14 @@ SWINGS: Mapping[Where, Mapping[str, Swing]] = MappingProxyType(
 ELBOW_JOINT = 4
 """Pinocchio's index of the elbow joint of the three arms with seven joints."""
 
-OBSTACLE_RADIUS_M = 0.05
-"""Radius of the obstacle, half the edge of a box."""
+AMPLITUDE_RAD = 0.6
+"""Amplitude of a swing that is not chosen by hand, or less where a joint's range is short."""
 
-CAPSULE_LENGTH_M = 0.3
-"""Length of the capsule's segment."""
+ROOM_RAD = 0.2
+"""Distance from a position limit at which such a swing turns back."""
+
+SHORTEST_SWING_M = 0.1
+"""Least amplitude of the hand in such a swing."""
 
 MARGIN_M = 0.01
 """Distance to keep."""
@@ -87,7 +98,9 @@ class ObstacleInTheWay(Family):
     a motion that keeps clear leaves the path and returns. With `elbow` (panda, xarm7, lwr) the
     shoulder swings in the plane of the arm and the obstacle is next to the elbow, in the direction
     in which the null space moves it; a motion that does the whole task and keeps clear exists, and
-    is certified. A sphere or capsule has the radius
+    is certified. The swings of five arms were chosen by hand; for any other the joint with the
+    longest lever is taken, and the direction from the hand to the obstacle, with which the
+    certificate holds. A sphere or capsule has the radius
     0.05 m, a cube edges of 0.1 m; a capsule points at the robot. The margin is 0.01 m, from
     capsules around the links (see `dikbench.robots.collision.bodies`). A seed moves the middle
     posture by up to 0.03 rad per joint and changes the duration by up to 10 %.
@@ -97,7 +110,7 @@ class ObstacleInTheWay(Family):
     Shows in: distance_min_m, distance_violation_max_m, position_error_max_m
 
     Attributes:
-        robot: one of these robots; lwr with elbow only, ur3, ur5 and ur10 with hand only.
+        robot: a robot's name, or the path of a URDF; with elbow panda, xarm7 or lwr.
         where: the part that hits the obstacle.
         shape: shape of the obstacle.
         depth: largest depth of the exact motion inside the obstacle.
@@ -107,33 +120,78 @@ class ObstacleInTheWay(Family):
     (the null space of a redundant arm keeps it clear).
     """
 
-    robot: Literal["panda", "ur3", "ur5", "ur10", "xarm7", "lwr"] = "panda"
-    frame: None = None
     where: Annotated[Where, Drawn()] = "hand"
     shape: Annotated[Shape, Drawn()] = "sphere"
     depth: Annotated[float, Range(0.01, 0.05, "m"), Drawn(0.015, 0.04)] = 0.03
     speed: Annotated[float, Range(0.05, 0.9), Drawn(0.1, 0.6)] = 0.3
 
+    robots = ("panda", "ur3", "ur5", "ur10", "xarm7")
     variation = Variation(start=0.03, timing=0.1)
 
     def check(self) -> None:
-        """Check that the robot swings past an obstacle there."""
-        if self.robot not in SWINGS[self.where]:
+        """Check that the robot's elbow is known."""
+        if self.where == "elbow" and self.robot not in SWINGS[self.where]:
             valid = ", ".join(SWINGS[self.where])
             raise DikbenchError(f"robot={self.robot} with where={self.where}; valid: {valid}")
 
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """See `Family`."""
-        swing = SWINGS[self.where][self.robot]
+        known = SWINGS[self.where].get(self.robot)
+        if known is not None:
+            return self._past(robot, known, "tool", *self._swung(robot, change, known))
+        _check_hand(robot)
+        refused = ""
+        for swing in _swings(robot):
+            try:
+                swung = self._swung(robot, change, swing)
+                motion = swung[2]
+                easy = usual_claims(motion, speed=(0.0, 1.0), sigma_min=0.04, margin=0.1)
+                Certificate(easy).check(f"joint {swing.joint + 1}")
+            except DikbenchError as error:
+                refused = refused or str(error)
+                continue
+            for side in SIDES:
+                try:
+                    found = self._past(robot, swing, side, *swung)
+                    Certificate(found.claims).check(f"joint {swing.joint + 1}")
+                except DikbenchError as error:
+                    refused = refused or str(error)
+                else:
+                    return found
+        raise DikbenchError(
+            f"robot {robot.name}: no joint swings the frame {robot.frame} past an obstacle from "
+            f"its start{f'; first tried: {refused}' if refused else ''}"
+        )
+
+    def _swung(
+        self, robot: Robot, change: Perturbation, swing: Swing
+    ) -> tuple[Array, Reference, OracleMotion]:
+        """Compute the start (nq,), the path and the exact motion of a swing."""
         middle = robot.q0 if swing.middle is None else np.array(swing.middle)
         middle = change.posture(robot, middle)
         q0, at_one_second = _swing(robot, middle, swing, 1.0)
         duration = duration_at(robot, at_one_second, q0, self.speed) * change.pace
         _, reference = _swing(robot, middle, swing, duration)
-        motion = self.exact_motion(robot, reference, q0, most=100)
+        return q0, reference, self.exact_motion(robot, reference, q0, most=100)
+
+    def _past(
+        self,
+        robot: Robot,
+        swing: Swing,
+        side: Side,
+        q0: Array,
+        reference: Reference,
+        motion: OracleMotion,
+    ) -> Case:
+        """Make the case of a swing, the obstacle on a side of the hand."""
         half_way = motion.q[len(motion.q) // 2]
+        in_the_way = (
+            _beside_elbow(robot, half_way)
+            if self.where == "elbow"
+            else beside_hand(robot, half_way, side)
+        )
         constraint = replace(
-            _in_the_way(robot, half_way, swing.joint, self.where, self.shape, self.depth),
+            obstacle_at(robot, half_way, swing.joint, in_the_way, self.shape, self.depth, MARGIN_M),
             influence=influence_distance(robot),
         )
         distance, depth = constraint.distances(robot, motion.q), 0.8 * self.depth
@@ -155,6 +213,41 @@ class ObstacleInTheWay(Family):
         return Case(reference, q0, motion, claims, constraints=(constraint,), witness=other)
 
 
+def _check_hand(arm: Robot) -> None:
+    """Check that the robot has collision geometry that moves with the task frame.
+
+    Raises:
+        DikbenchError: if it has not.
+    """
+    far = SphereObstacle((0.0, 0.0, 0.0), RADIUS_M)
+    pairs = CollisionConstraint((far,), self_collision=False).pairs(arm)
+    if not any(_hand(arm) & {*joints} for joints in pairs.joints):
+        raise DikbenchError(
+            f"robot {arm.name}: no collision geometry moves with the frame {arm.frame}"
+        )
+
+
+def _hand(arm: Robot) -> set[int]:
+    """Return Pinocchio's indices of the task frame's joint and of those that it carries."""
+    return set(arm.model.subtrees[arm.model.frames[arm.frame_id].parentJoint])
+
+
+def _swings(arm: Robot) -> Iterator[Swing]:
+    """Yield swings of the joints that turn, those with the longest levers at the start first."""
+    kinematics, limits = Kinematics(arm), arm.limits.at(arm.q0)
+    kinematics.update(arm.q0)
+    J = kinematics.spatial_jacobian
+    hand = kinematics.placement(arm.frame_id).translation
+    room = np.full(arm.nv, np.inf)
+    if limits.to_lower is not None and limits.to_upper is not None:
+        room = np.minimum(limits.to_lower, limits.to_upper) - ROOM_RAD
+    levers = {int(j): float(np.linalg.norm(point_velocity(J[:, j], hand))) for j in arm.chain}
+    for j in sorted(levers, key=lambda j: -levers[j]):
+        amplitude = min(AMPLITUDE_RAD, float(room[j]))
+        if np.linalg.norm(J[3:, j]) > 0 and amplitude * levers[j] >= SHORTEST_SWING_M:
+            yield Swing(j, amplitude)
+
+
 def _swing(arm: Robot, middle: Array, swing: Swing, duration: float) -> tuple[Array, Reference]:
     """Compute the start (nq,) and the path of the task frame of a swing past the middle."""
     offset = np.zeros(arm.nv)
@@ -174,34 +267,10 @@ def _swing(arm: Robot, middle: Array, swing: Swing, duration: float) -> tuple[Ar
     return q_r(0.0), joint_path(arm, q_r, v_r, duration)
 
 
-def _in_the_way(
-    arm: Robot, q: Array, joint: int, where: Where, shape: Shape, depth: float
-) -> CollisionConstraint:
-    """Place the obstacle that the motion enters at q by `depth`, and constrain it."""
-    kinematics = Kinematics(arm)
-    kinematics.update(q)
-    J = kinematics.spatial_jacobian
-    if where == "hand":
-        X = kinematics.placement(arm.frame_id)
-        point, away = X.translation.copy(), X.rotation[:, 2].copy()
-    else:
-        _, point, away = _elbow_turn(arm, q)
-    along = _velocity(J[:, joint], point)
-    away /= np.linalg.norm(away)
-    along -= along @ away * away
-    along /= np.linalg.norm(along)
-    make = _SHAPES[shape]
-
-    def constraint(offset: float) -> CollisionConstraint:
-        solid = make(point + offset * away, np.column_stack([along, np.cross(away, along), away]))
-        return CollisionConstraint((solid,), self_collision=False, margin=MARGIN_M)
-
-    near, far = 0.0, 0.6
-    while far - near > 1e-9:
-        half = (near + far) / 2
-        inside = constraint(half).distances(arm, q[None])[0] < -depth
-        near, far = (half, far) if inside else (near, half)
-    return constraint(far)
+def _beside_elbow(arm: Robot, q: Array) -> tuple[Array, Array]:
+    """Return the elbow (3,) [m] and the direction (3,) in which the null space moves it."""
+    _, elbow, velocity = _elbow_turn(arm, q)
+    return elbow, velocity
 
 
 def _elbow_turn(arm: Robot, q: Array) -> tuple[Array, Array, Array]:
@@ -215,23 +284,17 @@ def _elbow_turn(arm: Robot, q: Array) -> tuple[Array, Array, Array]:
     elbow = arm.scratch.oMi[ELBOW_JOINT].translation.copy()
     z = null_space(kinematics.jacobian(arm.frame_id), 1e-6)[:, 0]
     before = slice(0, ELBOW_JOINT - 1)  # the joints that move the elbow
-    velocity = _velocity(kinematics.spatial_jacobian[:, before] @ z[before], elbow)
+    velocity = point_velocity(kinematics.spatial_jacobian[:, before] @ z[before], elbow)
     sign = -np.sign(velocity[1])
     return sign * z, elbow, sign * velocity
 
 
-def _velocity(twist: Array, point: Array) -> Array:
-    """Compute the velocity (3,) of a point under a twist given at the world's origin."""
-    velocity: Array = twist[:3] + np.cross(twist[3:], point)
-    return velocity
-
-
 def _distance_of_hand(arm: Robot, q: Array, constraint: CollisionConstraint) -> float:
-    """Compute the least distance [m] of what the task frame's joint carries."""
+    """Compute the least distance [m] of what the task frame's joint carries, fingers too."""
     kinematics, pairs = Kinematics(arm), constraint.pairs(arm)
     kinematics.update(q)
-    joint = arm.model.frames[arm.frame_id].parentJoint
-    carried = np.array([joint in joints for joints in pairs.joints])
+    hand = _hand(arm)
+    carried = np.array([bool(hand & {*joints}) for joints in pairs.joints])
     return float(pairs.distances(kinematics)[carried].min())
 
 
@@ -258,23 +321,3 @@ def _turned(arm: Robot, reference: Reference, instants: Array, q0: Array, turn: 
         q = pin.integrate(arm.model, motion[-1], -step * z)
         motion.append(solve_placement(arm, reference.placement(tau), q))
     return np.array(motion)
-
-
-def _sphere(centre: Array, axes: Array) -> Obstacle:
-    del axes
-    return SphereObstacle(tuple(centre), OBSTACLE_RADIUS_M)
-
-
-def _capsule(centre: Array, axes: Array) -> Obstacle:
-    return CapsuleObstacle(
-        tuple(centre), tuple(centre + CAPSULE_LENGTH_M * axes[:, 2]), OBSTACLE_RADIUS_M
-    )
-
-
-def _box(centre: Array, axes: Array) -> Obstacle:
-    return BoxObstacle(tuple(centre), (2 * OBSTACLE_RADIUS_M,) * 3, tuple(map(tuple, axes)))
-
-
-_SHAPES: Mapping[Shape, Callable[[Array, Array], Obstacle]] = MappingProxyType(
-    {"sphere": _sphere, "capsule": _capsule, "box": _box}
-)

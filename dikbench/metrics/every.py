@@ -10,6 +10,7 @@ import numpy as np
 from dikbench.metrics.chatter import CHATTER
 from dikbench.metrics.contour import CONTOUR
 from dikbench.metrics.distance_and_torque import CONSTRAINTS
+from dikbench.metrics.freeze import FREEZE
 from dikbench.metrics.metric import Metric
 from dikbench.metrics.motion import Motion
 from dikbench.metrics.null_space_drift import NULL_SPACE_DRIFT
@@ -21,7 +22,7 @@ from dikbench.metrics.violation import VIOLATION
 
 _KINDS = (
     TRACKING, PATH_FOLLOWING, CONTOUR, NULL_SPACE_DRIFT, VIOLATION, CONSTRAINTS, SMOOTHNESS,
-    CHATTER, SOLVER,
+    CHATTER, FREEZE, SOLVER,
 )  # fmt: skip
 
 METRICS: Mapping[str, Metric] = MappingProxyType(

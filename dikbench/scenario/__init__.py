@@ -53,6 +53,7 @@ from dikbench.scenario.building import (
 )
 from dikbench.scenario.certificate import Certificate, Claim
 from dikbench.scenario.family import Case, Family, Gain, Time
+from dikbench.scenario.obstacle_file import read_obstacles
 from dikbench.scenario.oracle import (
     OracleMotion,
     joint_oracle,
@@ -64,7 +65,8 @@ from dikbench.scenario.oracle import (
 from dikbench.scenario.reference.curves import circle, lemniscate, plane_of
 from dikbench.scenario.reference.pose_file import PoseFile, read_poses
 from dikbench.scenario.reference.reference import Reference, joint_path, screw_path, target_at_rest
-from dikbench.scenario.reference.waypoints import through
+from dikbench.scenario.reference.spline import spline_through
+from dikbench.scenario.reference.waypoints import held, through
 from dikbench.scenario.scenario import Scenario
 from dikbench.scenario.singularity import (
     Kind,
@@ -128,6 +130,7 @@ __all__ = [
     "duration_at",
     "effort_limits",
     "from_rest_to_rest",
+    "held",
     "influence_distance",
     "joint_oracle",
     "joint_path",
@@ -143,6 +146,7 @@ __all__ = [
     "placement_of",
     "plane_of",
     "position_margin",
+    "read_obstacles",
     "read_poses",
     "samples",
     "screw_path",
@@ -150,6 +154,7 @@ __all__ = [
     "singular_postures",
     "smallest_singular_value",
     "solve_placement",
+    "spline_through",
     "start_velocity",
     "step_claims",
     "target_at_rest",

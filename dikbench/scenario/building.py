@@ -101,8 +101,16 @@ def duration_at(robot: Robot, at_one_second: Reference, q0: Array, speed: float)
         at_one_second: the motion done in one second; joint speeds are proportional to 1/duration.
         q0: configuration at its beginning, (nq,).
         speed: peak of the joint speeds over their limits.
+
+    Raises:
+        DikbenchError: if no joint that moves has a limit.
     """
     motion = oracle_motion(robot, at_one_second, q0, np.linspace(0.0, 1.0, 201))
+    if motion.peak_speed_ratio == 0:
+        raise DikbenchError(
+            f"robot {robot.name}: no joint that moves has a velocity limit; "
+            "valid: velocity=..., such as velocity=2 [rad/s]"
+        )
     return motion.peak_speed_ratio / speed
 
 

@@ -6,6 +6,7 @@ import importlib
 import sys
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
@@ -17,6 +18,7 @@ from dikbench.errors import DikbenchError
 from dikbench.metrics import motion_of
 from dikbench.plugins.building import make_scenario
 from dikbench.problem.constraints import CollisionConstraint
+from dikbench.robots.example_robot_data import data_file
 from dikbench.robots.kinematics import Kinematics
 from dikbench.scenario import Scenario
 from dikbench.simulation.closed_loop import Run
@@ -31,6 +33,8 @@ CASES = [
     "self-collision[robot=panda,speed=0.6]",
     "self-collision[robot=ur5,speed=0.6]",
 ]
+
+DATA = Path(__file__).parents[1] / "data" / "urdf"
 
 EXACT = 1e-8
 """How far daqp may be from a row [m]."""
@@ -166,6 +170,23 @@ def test_rows_come_and_go() -> None:
     assert active[-1] < 0.6 * max(active)
 
 
+@pytest.mark.parametrize("robot", ["lwr", "baxter.urdf"])
+def test_an_obstacle_is_found_for_the_hand_of_any_arm(robot: str) -> None:
+    """Without a swing chosen by hand: other limbs stay, a law that does not look runs into it."""
+    if robot == "baxter.urdf":
+        robot = f"{data_file('baxter_description/urdf/baxter.urdf')},frame=right_gripper"
+    scenario = make_scenario(f"obstacle[robot={robot}]")
+    arm, motion = scenario.robot, scenario.motion
+    assert motion is not None
+    moved = np.flatnonzero(np.ptp(motion.q, axis=0) > 1e-9)
+    assert set(moved) <= set(arm.limits.q_index[arm.chain])
+    run, constraint = run_of("dls", scenario), _constraint(scenario)
+    distance = constraint.distances(arm, run.trace.q)
+    assert distance[0] > constraint.margin
+    assert distance.min() < -0.015
+    assert _errors(run, scenario).max() < 5e-3
+
+
 # --- what does not certify
 
 
@@ -199,7 +220,12 @@ def test_an_arm_that_stays_unfolded_does_not_certify(monkeypatch: pytest.MonkeyP
 @pytest.mark.parametrize(
     ("selector", "part"),
     [
-        ("obstacle[robot=lwr]", "robot=lwr with where=hand; valid: panda, ur3, ur5, ur10, xarm7"),
+        (
+            "obstacle[robot=kinova,where=elbow]",
+            "robot=kinova with where=elbow; valid: panda, xarm7, lwr",
+        ),
+        (f"obstacle[robot={DATA / 'base.urdf'},frame=tool]", "base: no collision geometry"),
+        ("obstacle[robot=panda,velocity=inf]", "no joint that moves has a velocity limit"),
         ("obstacle[robot=ur5,where=elbow]", "valid: panda, xarm7, lwr"),
         ("obstacle[depth=0.2]", "depth=0.2 must be 0.01 to 0.05"),
         ("obstacle[shape=cone]", "sphere, capsule, box"),

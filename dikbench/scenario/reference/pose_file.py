@@ -5,7 +5,10 @@ from __future__ import annotations
 import csv
 import math
 import os.path
+from collections.abc import Iterator
 from dataclasses import dataclass
+from decimal import Decimal, DecimalException
+from itertools import zip_longest
 from typing import Any, Final
 
 import numpy as np
@@ -15,8 +18,22 @@ from dikbench.errors import DikbenchError
 
 POSE_COLUMNS: Final = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
 
+SEPARATORS: Final = (",", ";", "\t")
+
+COMMENT: Final = "#"
+"""A line that begins with it is no row; it may hold the header, as numpy.savetxt writes it."""
+
 QUATERNION_NORM_TOLERANCE: Final = 1e-3
 """Largest error of a quaternion's norm, which comes from rounded digits."""
+
+SHORTEST_SPAN_S: Final = 1e-9
+"""Least time between two rows."""
+
+LONGEST_QUOTE: Final = 80
+"""So many characters of a header are quoted."""
+
+FARTHEST_M: Final = 1e6
+"""Coordinates beyond it are mistakes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,55 +54,115 @@ class PoseFile:
 def read_poses(path: str) -> PoseFile:
     """Read a CSV file with the columns t [s], x, y, z [m], qx, qy, qz, qw (unit quaternion).
 
-    Columns may be in any order, others are ignored. Times count from the first row.
+    Columns may be in any order, others are ignored; commas, semicolons or tabs separate them. Lines
+    that are empty or begin with # are no rows. Times count from the first row, which is subtracted
+    in decimal digits: stamps of a clock, such as 1700000000.02, lose none.
 
     Raises:
-        DikbenchError: if the file, a column or a value is missing, a value is not a finite number,
-            times do not increase, a quaternion is not of unit norm, or there are fewer than two
-            rows.
+        DikbenchError: if the file, a column or a value is missing, a column stands twice, a row has
+            more values than there are columns, a value is not a finite number, times do not
+            increase by a nanosecond at least, a quaternion is not of unit norm, or there are fewer
+            than two rows.
     """
     if not os.path.isfile(path):
         raise DikbenchError(f"pose file not found: {path}")
+    start, before = Decimal(0), ""
     times: list[float] = []
     placements: list[Any] = []
     lines: list[int] = []
     try:
-        with open(path, encoding="utf-8-sig", newline="") as file:
-            rows = csv.DictReader(file, skipinitialspace=True)
-            missing = [name for name in POSE_COLUMNS if name not in (rows.fieldnames or ())]
-            if missing:
-                expected = ",".join(POSE_COLUMNS)
-                raise DikbenchError(
-                    f"pose file {path}: no column {missing[0]!r}; expected: {expected}"
-                )
-            for row in rows:
-                where = f"pose file {path}, line {rows.line_num}"
-                t, *pose = (_number(row[name], name, where) for name in POSE_COLUMNS)
-                if times and t <= times[-1]:
-                    raise DikbenchError(f"{where}: t={t:g} must be above {times[-1]:g} before it")
-                times.append(t)
-                placements.append(_placement(pose, where))
-                lines.append(rows.line_num)
-    except (UnicodeDecodeError, csv.Error) as error:
+        for line, row in _rows(path):
+            where, stamp = f"pose file {path}, line {line}", row["t"]
+            time = _decimal(stamp, where)
+            start = start if times else time
+            t = float(time - start)
+            if times and t <= times[-1]:
+                raise DikbenchError(f"{where}: t={stamp} must be above {before} before it")
+            if times and t - times[-1] < SHORTEST_SPAN_S:
+                raise DikbenchError(f"{where}: t={stamp} is less than 1 ns after {before}")
+            before = stamp
+            times.append(t)
+            pose = [_number(row[name], name, where) for name in POSE_COLUMNS[1:]]
+            placements.append(_placement(pose, where))
+            lines.append(line)
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise DikbenchError(f"pose file {path} is not a CSV file: {error}") from None
     if len(times) < 2:
         raise DikbenchError(f"pose file {path}: {len(times)} rows of poses; at least 2 are needed")
-    return PoseFile(tuple(t - times[0] for t in times), tuple(placements), tuple(lines))
+    return PoseFile(tuple(times), tuple(placements), tuple(lines))
 
 
-def _number(text: str | None, name: str, where: str) -> float:
+def _rows(path: str) -> Iterator[tuple[int, dict[str, str]]]:
+    """Yield the number of the line of each row, and its values by column."""
+    header: list[str] = []
+    separator = SEPARATORS[0]
+    with open(path, encoding="utf-8-sig") as file:
+        for line, text in enumerate(file, start=1):
+            where = f"pose file {path}, line {line}"
+            text = text.strip("\n")
+            comment = text.lstrip().startswith(COMMENT)
+            if not text.strip() or (comment and header):
+                continue
+            if header:
+                cells = _cells(text, separator)
+                if any(cells[len(header) :]):
+                    raise DikbenchError(
+                        f"{where}: {len(cells)} values; the header has {len(header)} columns"
+                    )
+                yield line, dict(zip_longest(header, cells[: len(header)], fillvalue=""))
+                continue
+            separator = max(SEPARATORS, key=text.count)
+            names = _cells(text.lstrip(f"{COMMENT} ") if comment else text, separator)
+            if not comment or set(POSE_COLUMNS) <= set(names):
+                _check_header(names, text, path)
+                header = names
+    if not header:
+        _check_header([], "", path)
+
+
+def _cells(text: str, separator: str) -> list[str]:
+    """Split a line into its values."""
+    return [cell.strip() for cell in next(csv.reader([text], delimiter=separator))]
+
+
+def _check_header(names: list[str], text: str, path: str) -> None:
+    """Check that each column is there once; a line that lacks one is quoted."""
+    said = f"; the header is {text[:LONGEST_QUOTE]!r}" if text else ""
+    for name in POSE_COLUMNS:
+        if name not in names:
+            expected = ",".join(POSE_COLUMNS)
+            raise DikbenchError(f"pose file {path}: no column {name!r}; expected: {expected}{said}")
+        if names.count(name) > 1:
+            raise DikbenchError(f"pose file {path}: column {name!r} stands twice{said}")
+
+
+def _number(text: str, name: str, where: str) -> float:
     try:
-        value = float(text or "")
+        value = float(text)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise DikbenchError(f"{where}: {name}={text or ''!r} is not a finite number")
+        raise DikbenchError(f"{where}: {name}={text!r} is not a finite number")
     return value
 
 
+def _decimal(stamp: str, where: str) -> Decimal:
+    _number(stamp, "t", where)
+    try:
+        return Decimal(stamp)
+    except DecimalException:  # an exponent of twenty digits
+        raise DikbenchError(f"{where}: t={stamp!r} is not a finite number") from None
+
+
 def _placement(pose: list[float], where: str) -> Any:
+    for name, value in zip(POSE_COLUMNS[1:4], pose, strict=False):
+        if abs(value) > FARTHEST_M:
+            raise DikbenchError(f"{where}: {name}={value:g} must be within {FARTHEST_M:g} m")
     quaternion = np.array(pose[3:])
-    norm = float(np.linalg.norm(quaternion))
+    norm = math.hypot(*pose[3:])
     if abs(norm - 1) > QUATERNION_NORM_TOLERANCE:
-        raise DikbenchError(f"{where}: the quaternion's norm is {norm:.4g}, it must be 1")
+        raise DikbenchError(
+            f"{where}: the quaternion's norm is {norm:.4g}, it must be 1 to within "
+            f"{QUATERNION_NORM_TOLERANCE:g}"
+        )
     return pin.SE3(pin.Quaternion(quaternion / norm).matrix(), np.array(pose[:3]))

@@ -1,4 +1,4 @@
-"""A path through placements at given times, along screw motions."""
+"""A path through placements at given times: along screw motions, or held from each to the next."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.arrays import Array
+from dikbench.scenario.reference.embedded_path import SAME_INSTANT_S
 from dikbench.scenario.reference.reference import Reference
 
 
@@ -28,20 +29,47 @@ def through(times: Sequence[float], placements: Sequence[Any], *, smooth: bool) 
     """
     twists = [pin.log6(here.actInv(there)).np for here, there in pairwise(placements)]
     spans = np.diff(times)
-
-    def segment(tau: float) -> tuple[int, float]:
-        k = min(max(bisect_right(times, tau) - 1, 0), len(twists) - 1)
-        return k, min(max((tau - times[k]) / spans[k], 0.0), 1.0)
+    rounding = 0.0 if smooth else SAME_INSTANT_S  # at rest there is no other velocity to take
 
     def placement(tau: float) -> Any:
-        k, u = segment(tau)
+        k, u = segment_at(times, tau, rounding)
         s = u**3 * (10 - 15 * u + 6 * u**2) if smooth else u
         return placements[k] * pin.exp6(pin.Motion(s * twists[k]))
 
     def velocity(tau: float) -> Array:
-        k, u = segment(tau)
+        k, u = segment_at(times, tau, rounding)
         rate = 30 * u**2 * (1 - u) ** 2 if smooth else 1.0
         twist: Array = rate / spans[k] * twists[k]
         return twist
 
     return Reference(float(times[-1]), placement, velocity)
+
+
+def held(times: Sequence[float], placements: Sequence[Any]) -> Reference:
+    """Hold each placement until the time of the next one, at rest.
+
+    Args:
+        times: increasing, from 0 on, at least two [s].
+        placements: one per time (`pinocchio.SE3`).
+    """
+    zero = np.zeros(6)
+
+    def placement(tau: float) -> Any:
+        k, u = segment_at(times, tau)
+        return placements[k + (u == 1.0)]
+
+    return Reference(float(times[-1]), placement, lambda tau: zero)
+
+
+def segment_at(
+    times: Sequence[float], tau: float, rounding: float = SAME_INSTANT_S
+) -> tuple[int, float]:
+    """Find the segment between two times in which tau lies, and its share of the segment.
+
+    Args:
+        times: increasing, at least two [s].
+        tau: [s]; before the first time and after the last one it is at these.
+        rounding: a tau so little before a time belongs to the segment that begins there [s].
+    """
+    k = min(max(bisect_right(times, tau + rounding) - 1, 0), len(times) - 2)
+    return k, min(max((tau - times[k]) / (times[k + 1] - times[k]), 0.0), 1.0)

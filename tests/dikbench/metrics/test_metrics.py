@@ -146,6 +146,7 @@ BOTH_ERRORS = [
         # Only one change of velocity, by -3 rad/s in 0.1 s, is above 20 rad/s^2.
         ("chatter_share", 0.0),
         ("chatter_steps", 0.0),
+        ("freeze_events", 0.0),  # its target rests
         ("contour_error_rms_m", _rms(*ERRORS)),
         ("contour_error_p95_m", _chord(0.2)),
         ("contour_error_max_m", _chord(0.2)),
@@ -332,7 +333,8 @@ def test_no_step_leaves_what_it_cannot_define() -> None:
     for name, value in got.items():
         defined = ("error" in name and "direction" not in name) or name in {
             "joint_travel_rad", "sigma_min", "position_violation_max_rad", "path_length_m",
-            "fallback_steps", "relaxed_steps", "chatter_steps", "acceleration_variation_rad_s2"
+            "fallback_steps", "relaxed_steps", "chatter_steps", "acceleration_variation_rad_s2",
+            "freeze_events",
         } or "integral" in name  # fmt: skip
         assert math.isnan(value) != defined, name
     assert got["position_error_max_m"] == pytest.approx(0.0, abs=1e-12)

@@ -34,7 +34,6 @@ EVERY = [
     if name != "csv"
     for k, robot in enumerate(certified_robots(family))
     for seed in (0, 1)
-    if (name, robot) != ("obstacle", "lwr")  # with an elbow only
 ]
 """The defaults of every family on every robot; the normal run has the first of each."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from dikbench.errors import DikbenchError
 from dikbench.scenario.reference.pose_file import read_poses
 
+POSES = Path(__file__).parents[3] / "data" / "poses"
 HEADER = "t,x,y,z,qx,qy,qz,qw"
 FIRST = "0,0.3,0,0.5,1,0,0,0"
 
@@ -52,9 +54,71 @@ def test_a_quaternion_whose_digits_were_cut_still_makes_a_rotation(tmp_path: Pat
     assert R @ R.T == pytest.approx(np.eye(3), abs=1e-12)
 
 
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize(
+    "header",
+    [
+        "t,x,y,z,qx,qy,qz,qw",
+        "t ,x , y,z ,qx,qy,qz,qw ",
+        "t,x,y,z,qx,qy,qz,qw,,",
+        '"t","x","y","z","qx","qy","qz","qw"',
+        "# t,x,y,z,qx,qy,qz,qw",
+    ],
+)
+def test_a_file_is_the_same_however_it_is_written(
+    header: str, end: str, separator: str, tmp_path: Path
+) -> None:
+    """Separators, line ends, blanks, quotes, comments; lines are counted as an editor does."""
+    text = ["# by a recorder; rev, 2", header, FIRST, "", "  # paused, here", "0.25,1,2,3,0,0,0,1,"]
+    path = tmp_path / "poses.csv"
+    path.write_bytes(("\ufeff" + end.join(text)).replace(",", separator).encode())
+    poses = read_poses(str(path))
+    assert poses.times == (0.0, 0.25)
+    assert poses.lines == (3, 6)
+    assert poses.placements[1].translation.tolist() == [1.0, 2.0, 3.0]
+
+
+@pytest.mark.parametrize("origin", ["1700000000", "-86400", "1e15", "123456789012345678"])
+def test_the_first_time_is_subtracted_before_digits_are_lost(origin: str, tmp_path: Path) -> None:
+    """Stamps of any clock, to the nanosecond."""
+    seconds = Decimal(origin)
+    later = [seconds + Decimal(text) for text in ("0.000000001", "0.1", "0.3", "7.000000001")]
+    rows = [f"{stamp:f},0,0,0,0,0,0,1" for stamp in (seconds, *later)]
+    poses = read_poses(_file(tmp_path, HEADER, *rows))
+    assert poses.times == (0.0, 1e-9, 0.1, 0.3, 7.000000001)
+
+
+@pytest.mark.parametrize("name", ["comment_first", "header_trailing", "semicolon"])
+def test_files_that_people_bring_are_read(name: str) -> None:
+    """41 rows over four seconds, whatever is written about them."""
+    poses = read_poses(str(POSES / f"{name}.csv"))
+    assert (len(poses.times), poses.times[-1]) == (41, 4.0)
+    assert poses.placements[1].translation.tolist() == [0.562710348, 0.315476674, 0.320737873]
+
+
+def test_a_column_that_stands_twice_is_refused_with_the_header() -> None:
+    """Not taken from one of the two."""
+    with pytest.raises(DikbenchError, match="column 'x' stands twice; the header is 't,x,y,z,qx"):
+        read_poses(str(POSES / "dup_col.csv"))
+
+
 @pytest.mark.parametrize(
     ("lines", "words"),
     [
+        (["time,x,y"], "no column 't'; expected: t,x,y,z,qx,qy,qz,qw; the header is 'time,x,y'"),
+        (["t x y z qx qy qz qw"], "the header is 't x y z qx qy qz qw'"),
+        (["# by a recorder", "0,1,2"], "the header is '0,1,2'"),
+        ([HEADER, FIRST, "0,5,0,0,0,0,0,0,0,1"], "line 3: 10 values; the header has 8 columns"),
+        (
+            [HEADER.replace(",", ";"), FIRST.replace(",", ";"), "0,5;0;0;0;0;0;0;1"],
+            "line 3: t='0,5' is not a finite number",
+        ),
+        ([HEADER, FIRST, "1e-10,0,0,0,0,0,0,1"], "line 3: t=1e-10 is less than 1 ns after 0"),
+        ([HEADER, FIRST, "1e400,0,0,0,0,0,0,1"], "line 3: t='1e400' is not a finite number"),
+        ([HEADER, FIRST, f"1e-{10**30},0,0,0,0,0,0,1"], "is not a finite number"),
+        ([HEADER, FIRST, "1,1e300,0,0,0,0,0,1"], "line 3: x=1e+300 must be within 1e+06 m"),
+        ([HEADER, FIRST, "1,0,0,0,0,0,0,1e300"], "line 3: the quaternion's norm is 1e+300"),
         ([], "no column 't'; expected: t,x,y,z,qx,qy,qz,qw"),
         (["t,x,y,z,qx,qy,qz", FIRST], "no column 'qw'; expected: t,x,y,z,qx,qy,qz,qw"),
         ([HEADER], "0 rows of poses; at least 2 are needed"),

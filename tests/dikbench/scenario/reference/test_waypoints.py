@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dikbench.scenario.reference.waypoints import through
+from dikbench.scenario.reference.pose_file import read_poses
+from dikbench.scenario.reference.waypoints import held, through
 
 twists = st.lists(
     st.lists(st.floats(-0.7, 0.7), min_size=6, max_size=6), min_size=2, max_size=5
@@ -85,6 +87,36 @@ def test_a_path_that_is_not_smooth_keeps_its_twist_within_a_segment(
     way = pin.log6(placements[0].actInv(placements[1])).np
     for share in (0.0, 0.3, 0.99):
         assert reference.velocity(share * times[1]) == pytest.approx(way / times[1], abs=1e-12)
+
+
+@given(twists, gaps, st.floats(0.0, 0.999))
+def test_a_placement_is_held_until_the_time_of_the_next_one(
+    placements: list[Any], gaps: list[float], share: float
+) -> None:
+    """At rest, and the last one from its own time on."""
+    times = _times(placements, gaps)
+    reference = held(times, placements)
+    for k, (here, there) in enumerate(pairwise(times)):
+        tau = here + share * (there - here)
+        assert reference.placement(tau) == placements[k]
+        assert not reference.velocity(tau).any()
+    assert reference.placement(times[-1]) == placements[-1]
+
+
+@pytest.mark.parametrize("origin", [0.0, 1000.0, 1.7e9])
+def test_the_feed_forward_of_a_sample_at_a_row_is_that_of_the_segment_that_begins_there(
+    origin: float, tmp_path: Path
+) -> None:
+    """Whatever clock the rows of a file are stamped by: its integral passes every row."""
+    path = tmp_path / "to_and_fro.csv"
+    rows = [f"{origin + k / 10!r},{0.1 * (k % 2)},0,0,0,0,0,1" for k in range(21)]
+    path.write_text("\n".join(["t,x,y,z,qx,qy,qz,qw", *rows]), encoding="utf-8")
+    poses = read_poses(str(path))
+    reference = through(poses.times, poses.placements, smooth=False)
+    x, dt = 0.0, 0.01
+    for n in range(200):
+        x += reference.velocity(n * dt)[0] * dt
+        assert x == pytest.approx(reference.placement((n + 1) * dt).translation[0], abs=1e-9)
 
 
 def test_the_smooth_way_is_that_of_least_jerk() -> None:
