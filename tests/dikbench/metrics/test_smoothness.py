@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from dikbench.arrays import Array
@@ -33,8 +34,8 @@ def of(name: str, v: Array, dt: float, start: float = 0.0) -> float:
         none, none, nothing, nothing, nothing, nothing,
     )  # fmt: skip
     scenario = Scenario(
-        ROBOT, ROBOT.q0, np.array([start, 0.0, 0.0]), target_at_rest(None, 1.0), PoseTask(), dt,
-        1.0, Certificate(()),
+        ROBOT, ROBOT.q0, np.array([start, 0.0, 0.0]), target_at_rest(pin.SE3.Identity(), 1.0),
+        PoseTask(), dt, 1.0, Certificate(()),
     )  # fmt: skip
     nowhere = np.zeros(n + 1)
     return METRICS[name].of(
