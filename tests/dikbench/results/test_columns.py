@@ -19,7 +19,8 @@ from dikbench.results.reading import read_results
 from dikbench.run.runner import RunSettings, status_of
 from dikbench.study.study import Cells, Study
 
-COMMITTED = Path(__file__).parents[3] / "results"
+DATA = Path(__file__).parents[2] / "data" / "first_release"
+"""The study `quick` as the first release ran it, which had no outcomes."""
 
 FIRST_RELEASE = {
     "law_time_median_us": "formulation_time_median_us",
@@ -79,8 +80,8 @@ def test_exports_of_the_first_release_are_read(committed: Path, tmp_path: Path, 
     old = {new: name for name, new in FIRST_RELEASE.items()}
     shutil.copy(committed / "manifest.json", tmp_path)
     if kind == "trials.csv":
-        texts = pd.read_csv(committed / kind, dtype=str, keep_default_na=False)
-        texts.rename(columns=old).to_csv(tmp_path / kind, index=False)
+        rows = pd.read_parquet(committed / "trials.parquet")
+        rows.rename(columns=old).to_csv(tmp_path / kind, index=False)
     else:
         pd.read_parquet(committed / kind).rename(columns=old).to_parquet(tmp_path / kind)
     found = read_results(tmp_path).trials
@@ -88,12 +89,11 @@ def test_exports_of_the_first_release_are_read(committed: Path, tmp_path: Path, 
     assert not set(FIRST_RELEASE) & set(found)
 
 
-@pytest.mark.parametrize(("name", "trials"), [("quick", 444), ("full", 22680)])
-def test_the_committed_results_are_read(name: str, trials: int) -> None:
+def test_results_of_the_first_release_are_read() -> None:
     """Whole, with their times; leniently it is said which of today's metrics they lack."""
     for lenient in (False, True):
-        found = read_results(COMMITTED / name, lenient=lenient)
-        assert len(found.trials) == trials
+        found = read_results(DATA, lenient=lenient)
+        assert len(found.trials) == 444
         assert found.trials["formulation_time_median_us"].notna().any()
         assert found.trials["timing_stability"].eq("stable").any()
         assert not set(FIRST_RELEASE) & set(found.trials)
@@ -109,19 +109,15 @@ def test_the_committed_results_are_read(name: str, trials: int) -> None:
             assert found.notes == ()
 
 
-@pytest.mark.parametrize("name", ["quick", pytest.param("full", marks=pytest.mark.long)])
-def test_the_committed_results_are_reported_and_compared(name: str, tmp_path: Path) -> None:
+def test_results_of_the_first_release_are_reported_and_compared(tmp_path: Path) -> None:
     """The page names the fastest formulation, and no time differs from itself."""
-    folder = tmp_path / name
-    folder.mkdir()
-    for file in (COMMITTED / name).iterdir():
-        if file.is_file() and file.name != "report.md":
-            shutil.copy(file, folder)
+    folder = tmp_path / "old"
+    shutil.copytree(DATA, folder)
     write_report(folder)
     page = (folder / "report.md").read_text()
     assert "No times were taken" not in page
     assert (folder / "tables" / "timing.csv").read_text().count("\n") > 5
-    times = compare(folder, COMMITTED / name).times
+    times = compare(folder, DATA).times
     assert len(times) > 5
     assert times["ratio"].eq(1.0).all()
     assert times["p99_ratio"].eq(1.0).all()

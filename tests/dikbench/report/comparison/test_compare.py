@@ -19,7 +19,7 @@ from dikbench.report.comparison.comparison import compare
 from dikbench.run.runner import RunSettings
 from dikbench.study.study import Cells, Study
 
-COMMITTED = Path(__file__).parents[4] / "results" / "quick"
+OLD = Path(__file__).parents[3] / "data" / "first_release"
 
 
 def dikbench(*arguments: object) -> Result:
@@ -34,9 +34,9 @@ def lines_of(result: Result) -> list[str]:
 
 
 def test_a_folder_does_not_differ_from_itself() -> None:
-    """The committed results against themselves: nothing to tell, exit code 0, guarded or not."""
-    plain = dikbench(COMMITTED, COMMITTED)
-    guarded = dikbench(COMMITTED, COMMITTED, "--tolerance", "position_error_rms_m=0")
+    """Results of the first release against themselves: nothing to tell, exit code 0, guarded or not."""
+    plain = dikbench(OLD, OLD)
+    guarded = dikbench(OLD, OLD, "--tolerance", "position_error_rms_m=0")
     assert plain.exit_code == guarded.exit_code == 0
     assert plain.output.startswith("No difference.\n")
     assert guarded.output.startswith("Within tolerance: no difference.\n")
@@ -218,7 +218,7 @@ def test_files_hold_every_row(folder: Callable[..., Path], tmp_path: Path) -> No
 )
 def test_malformed_tolerances(tolerance: str, message: str) -> None:
     """One line, exit code 2, and what would be valid."""
-    result = dikbench(COMMITTED, COMMITTED, "--tolerance", tolerance)
+    result = dikbench(OLD, OLD, "--tolerance", tolerance)
     assert result.exit_code == 2
     assert result.output.startswith("error: ")
     assert result.output.count("\n") == 1
