@@ -34,7 +34,7 @@ def lines_of(result: Result) -> list[str]:
 
 
 def test_a_folder_does_not_differ_from_itself() -> None:
-    """Results of the first release against themselves: nothing to tell, exit code 0, guarded or not."""
+    """Old results against themselves: nothing to tell, exit code 0, guarded or not."""
     plain = dikbench(OLD, OLD)
     guarded = dikbench(OLD, OLD, "--tolerance", "position_error_rms_m=0")
     assert plain.exit_code == guarded.exit_code == 0
