@@ -100,6 +100,10 @@ def _joint(element: ElementTree.Element) -> UrdfJoint:
         raise DikbenchError(f"{where} has the axis {text!r}; valid: a direction such as 0 0 1")
     lower, upper, velocity = -inf, inf, inf
     limit = element.find("limit")
+    if limit is None and element.get("type") != "continuous":
+        raise DikbenchError(
+            f"{where} has no limits; valid: <limit lower upper velocity effort>, or type continuous"
+        )
     if limit is not None:
         if element.get("type") != "continuous":
             lower, upper = (_number(limit, side, where) for side in ("lower", "upper"))

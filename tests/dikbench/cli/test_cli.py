@@ -99,7 +99,7 @@ MALFORMED = [
     (("recompute", "nowhere"), ("no results", "nowhere")),
     (("list", "laws"), ("laws", "formulations")),
     (("show", "nowhere.urdf"), ("robot file not found: nowhere.urdf",)),
-    (("show", "bad.urdf"), ("robot file bad.urdf: not a URDF that Pinocchio reads",)),
+    (("show", "bad.urdf"), ("robot file bad.urdf is not a URDF, which is XML",)),
     (("show", "csv[file=none.csv]"), ("none.csv",)),
     (("check", "csv"), ("'file' must be given; valid: csv[file=...], a text",)),
     (("run", "--scenario", "csv"), ("valid: csv[file=...], a text",)),
