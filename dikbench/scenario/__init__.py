@@ -53,6 +53,7 @@ from dikbench.scenario.building import (
 )
 from dikbench.scenario.certificate import Certificate, Claim
 from dikbench.scenario.family import Case, Family, Gain, Time
+from dikbench.scenario.named_robots import NamedRobotFamily
 from dikbench.scenario.oracle import (
     OracleMotion,
     joint_oracle,
@@ -95,6 +96,7 @@ __all__ = [
     "Kind",
     "Kinematics",
     "Mask",
+    "NamedRobotFamily",
     "Obstacle",
     "OracleMotion",
     "OrientationTask",
