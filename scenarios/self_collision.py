@@ -72,7 +72,7 @@ class SelfCollision(Family):
         """See `Family`."""
         offset, q0 = np.array(DISPLACEMENTS[self.robot]), change.posture(robot, robot.q0)
         at_one_second = joint_path(robot, *there_and_back(robot, q0, offset, 1.0), 1.0)
-        duration = duration_at(robot, at_one_second, q0, self.speed) * change.pace
+        duration = duration_at(robot, at_one_second, q0, self.speed, self.dt) * change.pace
         reference = joint_path(robot, *there_and_back(robot, q0, offset, duration), duration)
         motion = self.exact_motion(robot, reference, q0, most=100)
         constraint = CollisionConstraint(margin=MARGIN_M, influence=influence_distance(robot))
