@@ -52,7 +52,7 @@ from dikbench.scenario.building import (
     there_and_back,
     usual_claims,
 )
-from dikbench.scenario.certificate import Certificate, Claim
+from dikbench.scenario.certificate import Certificate, CertificateFailed, Claim
 from dikbench.scenario.family import Case, Family, Gain, Time
 from dikbench.scenario.named_robots import NamedRobotFamily
 from dikbench.scenario.oracle import (
@@ -60,6 +60,7 @@ from dikbench.scenario.oracle import (
     joint_oracle,
     measure_motion,
     oracle_motion,
+    position_margin,
     solve_placement,
 )
 from dikbench.scenario.reference.curves import circle, lemniscate, plane_of
@@ -87,6 +88,7 @@ __all__ = [
     "Case",
     "CentreOfMassTask",
     "Certificate",
+    "CertificateFailed",
     "Claim",
     "CollisionConstraint",
     "Constraint",
@@ -145,6 +147,7 @@ __all__ = [
     "oracle_motion",
     "placement_of",
     "plane_of",
+    "position_margin",
     "read_poses",
     "samples",
     "screw_path",
