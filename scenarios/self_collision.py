@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import islice
 from types import MappingProxyType
 from typing import Annotated
 
@@ -45,23 +46,32 @@ DISPLACEMENTS: Mapping[str, tuple[float, ...]] = MappingProxyType(
 MARGIN_M = 0.01
 """Distance to keep."""
 
+MARGINS_M = (MARGIN_M, 0.012, 0.014, 0.017, 0.02, 0.007, 0.005, 0.003)
+"""Distances to keep that are tried of a robot that is not known, one of which its start keeps."""
+
 DEPTH_M = 0.02
 """Smallest depth of the middle posture."""
 
 DEEPEST_M = 0.09
 """Largest depth of a displacement that is tried."""
 
-SIGMA_MIN = 0.05
+SIGMA_MIN = 0.045
 POSITION_MARGIN_RAD = 0.12
 """Smallest singular value (m, rad) and distance from a limit of one, a little above the claims'."""
 
-DRAWN = 600
+DRAWN = 3000
 """Displacements that are tried of a robot of which none is known."""
+
+ROUNDS = 10
+"""Rounds in which they are looked at, so that an early one is found soon."""
+
+TRIED = 20
+"""Largest number of motions among them that are followed exactly."""
 
 CHOSEN_SHARE = 0.5
 """Share of the joints that one of them moves."""
 
-FARTHEST_RAD = 2.0
+FARTHEST_RAD = 2.5
 """Largest displacement of a joint among them."""
 
 
@@ -72,10 +82,10 @@ class SelfCollision(Family):
     The joints move as q(t) = q_0 + sin^2(pi t/T) d and the task frame follows: the hand enters the
     base (panda, xarm7, tiago), the upper arm (ur3, ur5, ur10, kinova) or the chest (talos) by more
     than 0.02 m half way; for any other robot d is the first of a fixed list that brings a body of
-    the arm into another one. Distances are those of capsules around the meshes (see
-    `dikbench.robots.collision.bodies`), so that the true bodies may still be apart. The
-    margin is 0.01 m. A seed moves the start by up to 0.03 rad per joint and changes the duration by
-    up to 10 %.
+    the arm into another one, and the margin is one that its start keeps. Distances are those of
+    capsules around the meshes (see `dikbench.robots.collision.bodies`), so that the true bodies may
+    still be apart. The margin is 0.01 m. A seed moves the start by up to 0.03 rad per joint and
+    changes the duration by up to 10 %.
 
     Provokes: an arm that folds into itself
 
@@ -96,57 +106,78 @@ class SelfCollision(Family):
         """See `Family`."""
         q0 = change.posture(robot, robot.q0)
         if self.robot in DISPLACEMENTS and self.as_catalogued:
-            return self._case(robot, q0, np.array(DISPLACEMENTS[self.robot]), change)
+            offset, constraint = np.array(DISPLACEMENTS[self.robot]), _constraint(robot, MARGIN_M)
+            return self._case(robot, q0, offset, constraint, change)
         check_velocity_limits(robot, "the duration")
-        reason = "none brings the arm into itself inside the position limits"
-        for offset in self._displacements(robot, q0):
+        constraint = _clear_at(robot, q0)
+        reason = "none brings it in a little, away from limits and singularities"
+        for offset in islice(_displacements(robot, q0, constraint), TRIED):
             try:
-                case = self._case(robot, q0, offset, change)
+                case = self._case(robot, q0, offset, constraint, change)
                 Certificate(case.claims).check(robot.name)
             except DikbenchError as error:
-                reason = f"the last one that does: {error}"
+                reason = f"of the last one that brings it in: {error}"
                 continue
             return case
         raise DikbenchError(
-            f"no displacement of robot {robot.name} from its start, of {DRAWN} that were tried, is "
-            f"a path into itself and back: {reason}"
+            f"no path of robot {robot.name} from its start into itself and back is found, of "
+            f"{DRAWN} that were tried: {reason}"
         )
 
-    def _case(self, robot: Robot, q0: Array, offset: Array, change: Perturbation) -> Case:
+    def _case(
+        self,
+        robot: Robot,
+        q0: Array,
+        offset: Array,
+        constraint: CollisionConstraint,
+        change: Perturbation,
+    ) -> Case:
         at_one_second = joint_path(robot, *there_and_back(robot, q0, offset, 1.0), 1.0)
         duration = duration_at(robot, at_one_second, q0, self.speed, self.dt) * change.pace
         reference = joint_path(robot, *there_and_back(robot, q0, offset, duration), duration)
         motion = self.exact_motion(robot, reference, q0, most=100)
-        constraint = _constraint(robot)
-        distance = constraint.distances(robot, motion.q)
-        claims = collision_claims(motion, distance, MARGIN_M, depth=DEPTH_M, speed=self.speed)
+        distance, margin = constraint.distances(robot, motion.q), constraint.margin
+        claims = collision_claims(motion, distance, margin, depth=DEPTH_M, speed=self.speed)
         return Case(reference, q0, motion, claims, constraints=(constraint,))
 
-    def _displacements(self, robot: Robot, q0: Array) -> Iterator[Array]:
-        """Yield displacements (nv,) to inside of the arm that meet no limit and no singularity.
 
-        The middle posture is looked at first, then those on the way to it.
-        """
-        constraint, random = _constraint(robot), np.random.default_rng(0)
+def _constraint(robot: Robot, margin: float) -> CollisionConstraint:
+    return CollisionConstraint(margin=margin, influence=influence_distance(robot))
+
+
+def _clear_at(robot: Robot, q0: Array) -> CollisionConstraint:
+    """Return the constraint with the first of `MARGINS_M` that q0 (nq,) keeps by far.
+
+    Bodies of a URDF without an SRDF may be near each other at any configuration, by a distance that
+    is just above a margin; those that are nearer are left out.
+
+    Raises:
+        DikbenchError: if it keeps none.
+    """
+    for margin in MARGINS_M:
+        constraint = _constraint(robot, margin)
+        if constraint.distances(robot, q0[None])[0] >= 1.5 * margin:
+            return constraint
+    raise DikbenchError(f"robot {robot.name}: bodies of its arm are near each other at its start")
+
+
+def _displacements(robot: Robot, q0: Array, constraint: CollisionConstraint) -> Iterator[Array]:
+    """Yield displacements (nv,) into the arm that meet no limit and no singularity.
+
+    The middle posture is looked at first, then those on the way to it.
+    """
+    random, shape = np.random.default_rng(0), (DRAWN // ROUNDS, len(robot.chain))
+    for _ in range(ROUNDS):
         # Of a few joints at a time, as the known ones are.
-        chosen = random.uniform(size=(DRAWN, len(robot.chain))) < CHOSEN_SHARE
-        drawn = np.zeros((DRAWN, robot.nv))
-        drawn[:, robot.chain] = chosen * random.uniform(-FARTHEST_RAD, FARTHEST_RAD, chosen.shape)
+        chosen = random.uniform(size=shape) < CHOSEN_SHARE
+        drawn = np.zeros((len(chosen), robot.nv))
+        drawn[:, robot.chain] = chosen * random.uniform(-FARTHEST_RAD, FARTHEST_RAD, shape)
         drawn *= robot.joint_scale
         middles = np.array([pin.integrate(robot.model, q0, offset) for offset in drawn])
-        kept = [position_margin(robot, q) >= POSITION_MARGIN_RAD for q in middles]
-        drawn, middles = drawn[kept], middles[kept]
-        if not len(middles):
-            return
-        depth = -constraint.distances(robot, middles)
-        inside = (depth >= 1.1 * DEPTH_M) & (depth <= DEEPEST_M)
-        for offset in drawn[inside]:
-            way = joint_oracle(
-                robot, there_and_back(robot, q0, offset, 1.0)[0], np.linspace(0.0, 0.5, 11)
-            )
-            if way.sigma_min.min() >= SIGMA_MIN:
+        inside = [position_margin(robot, q) >= POSITION_MARGIN_RAD for q in middles]
+        drawn, middles = drawn[inside], middles[inside]
+        depths = -constraint.distances(robot, middles) if len(middles) else np.zeros(0)
+        for offset in drawn[(depths >= 1.1 * DEPTH_M) & (depths <= DEEPEST_M)]:
+            way, _ = there_and_back(robot, q0, offset, 1.0)
+            if joint_oracle(robot, way, np.linspace(0.0, 0.5, 11)).sigma_min.min() >= SIGMA_MIN:
                 yield offset
-
-
-def _constraint(robot: Robot) -> CollisionConstraint:
-    return CollisionConstraint(margin=MARGIN_M, influence=influence_distance(robot))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -81,7 +82,7 @@ def solve_placement(
     Raises:
         DikbenchError: if the residual (m, rad) does not fall below 1e-9.
     """
-    kinematics = Kinematics(robot)
+    kinematics = _kinematics(robot)
     q = seed
     error = np.inf
     for _ in range(iterations):
@@ -91,14 +92,25 @@ def solve_placement(
         before, error = error, float(np.linalg.norm(e))
         if error < 1e-12 or (error < 1e-9 and error >= before):
             return q  # there, up to rounding
+        moving = np.arange(robot.nv)
+        if robot.nv > 3 * len(robot.chain):  # joints elsewhere, a hundred perhaps, rest
+            moving = np.flatnonzero(J.any(axis=0))
+            J = J[:, moving]
         H = J.T @ J
         H.flat[:: len(H) + 1] += 0.1 * error**2 + 1e-12
-        step = np.linalg.solve(H, J.T @ e)
+        step = np.zeros(robot.nv)
+        step[moving] = np.linalg.solve(H, J.T @ e)
         largest = float(np.abs(step).max())
         q = pin.integrate(robot.model, q, step * min(1.0, 0.3 / max(largest, 1e-300)))
     raise DikbenchError(
         f"robot {robot.name}: no posture found for the placement, residual {error:.2g}"
     )
+
+
+@lru_cache(maxsize=4)
+def _kinematics(robot: Robot) -> Kinematics:
+    """Make what solves of one robot share: for a hundred joints it takes longer than a solve."""
+    return Kinematics(robot)
 
 
 def follow(
