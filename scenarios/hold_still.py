@@ -128,7 +128,8 @@ class HoldStill(Family):
         if self.robot in POSTURES and self.as_catalogued:
             q0 = self._known_posture(robot, change)
             return self._case(robot, q0, RANGES[self.posture])
-        reason = "none is inside the position limits"
+        limit = self.posture == "limit"
+        reason = "no joint has a limit" if limit else "none is inside the position limits"
         for q0 in self._postures(robot, change):
             case = self._case(robot, q0, ANY_RANGES[self.posture])
             try:

@@ -44,7 +44,8 @@ DIRECTIONS: Mapping[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = Ma
 screw there the arm meets neither a limit nor a singularity."""
 
 SMALLEST_FIRST_SPEED = 0.1
-"""Smallest initial speed over the limits that a step requires, per gain [1/s] and angle [rad]."""
+"""Smallest initial speed over the limits that a step requires, per gain [1/s] and angle [rad]
+(1 rad where the robot is not asked for its orientation)."""
 
 PAIRS = 60
 """Number of pairs of a direction and an axis to try where none is known."""
@@ -118,7 +119,8 @@ class Step(Family):
         away = start.translation + self.distance * start.rotation @ d
         target = pin.SE3(start.rotation @ pin.exp3(self.angle * a), away)
         way = motion_of_a_step(robot, q0, pin.log6(start.actInv(target)).np, self.gain)
-        least = SMALLEST_FIRST_SPEED * self.gain * self.angle
+        turned = self.angle if any(axis) else 1.0
+        least = SMALLEST_FIRST_SPEED * self.gain * turned
         claims = (*step_claims(way), Claim("first speed over limit", way.speed_ratio[0], least))
         witness = from_rest_to_rest(robot, way, 0.8 * self.duration)
         return Case(target_at_rest(target, self.duration), q0, None, claims, witness=witness)
