@@ -128,8 +128,9 @@ class HoldStill(Family):
         if self.robot in POSTURES and self.as_catalogued:
             q0 = self._known_posture(robot, change)
             return self._case(robot, q0, RANGES[self.posture])
-        limit = self.posture == "limit"
-        reason = "no joint has a limit" if limit else "none is inside the position limits"
+        reason = "no singular posture inside the position limits"
+        if self.posture == "limit":
+            reason = "no joint has a limit"
         for q0 in self._postures(robot, change):
             case = self._case(robot, q0, ANY_RANGES[self.posture])
             try:
@@ -138,7 +139,7 @@ class HoldStill(Family):
                 reason = f"of the last one tried, {error.failures}"
                 continue
             return case
-        raise DikbenchError(f"no posture={self.posture} of robot {robot.name} is found: {reason}")
+        raise DikbenchError(f"robot {robot.name} has no posture={self.posture}: {reason}")
 
     def _case(self, robot: Robot, q0: Array, ranges: Ranges) -> Case:
         motion = joint_oracle(robot, lambda tau: q0, samples(DURATION_S, self.dt, most=2))
