@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import pi
+from math import inf, pi
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
+from dikbench.errors import DikbenchError
 from dikbench.problem import Array, Robot
 from dikbench.scenario import (
     Case,
+    Certificate,
     Claim,
     Family,
+    OracleMotion,
     Perturbation,
     Reference,
     Variation,
@@ -27,6 +30,12 @@ from dikbench.scenario import (
 START_M = np.array([0.4, 0.8, 0.4])
 STOP_M = np.array([-0.4, 0.6, 0.6])
 DURATION_S = 10.0
+
+SHARES = tuple(0.8**k for k in range(14))
+"""Shares of the reach, and of the rotation of pi/4, that are tried where no path is known."""
+
+SMALLEST_SCALE = 0.05
+"""Of a path that is a sweep."""
 
 
 @dataclass(frozen=True)
@@ -76,39 +85,42 @@ class BackAndForth(Family):
 
     with start (0.4, 0.8, 0.4) m, stop (-0.4, 0.6, 0.6) m. UR3, UR5 and UR10 have the frame
     `ee_link`, R_t = I and scale 0.5, 0.9, 1.0; the Panda `panda_hand`, Rx(pi/2) and 0.7. In the
-    original the arms first move to the path; here they start on it. A seed turns the whole
+    original the arms first move to the path; here they start on it. For any other robot the middle
+    of the sweep is the placement of its start, turned about the vertical to lie across the arm, and
+    the size of the sweep and its rotation is the largest that certifies, from the robot's distance
+    from its first joint (and pi/4) down; a planar arm sweeps in its plane. A seed turns the whole
     path about the vertical by up to 0.2 rad and changes its pace by up to 10 %.
 
     Provokes: a wide and steady sweep, inside all limits
 
     Shows in: position_error_rms_m, orientation_error_rms_rad
 
-    Attributes:
-        robot: one of these robots, with its own frame.
-
     Source: pink_bench (Caron), back-and-forth trajectory.
     """
 
-    robot: Literal["ur3", "ur5", "ur10", "panda"] = "ur5"
-    frame: None = None
+    robot: str = "ur5"
     dt: float = 0.005
 
+    robots = tuple(SET_UPS)
     variation = Variation(direction=0.2, timing=0.1)
 
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """See `Family`."""
+        if self.robot not in SET_UPS or not self.as_catalogued:
+            return self._largest(robot, change)
         where = SET_UPS[self.robot]
         arm = replace(robot, frame=where.frame)
         # A rotation of the path about another axis would leave the reach.
         yaw = float(pin.log3(change.rotation(arm))[2])
-        reference = _path(where, yaw, change.pace)
+        target = pin.utils.rotate("x", where.roll)
+        turned = pin.utils.rotate("z", yaw)
+        first, offset = (turned @ (where.scale * x) for x in (START_M, STOP_M - START_M))
+        reference = _path(first, offset, yaw, target, change.pace)
         q0 = solve_placement(arm, reference.placement(0.0), np.array(where.near))
         motion = self.exact_motion(arm, reference, q0)
-        points = np.array([placement_of(arm, q).translation for q in motion.q[::4]])
-        sweep = np.linalg.norm(points - points[0], axis=1).max()
         least, largest = where.speed
         claims = (
-            Claim("sweep from end to end [m]", sweep, at_least=0.83 * where.scale),
+            Claim("sweep from end to end [m]", _sweep(arm, motion), at_least=0.83 * where.scale),
             *usual_claims(
                 motion,
                 speed=(least / change.pace, largest / change.pace),
@@ -118,29 +130,88 @@ class BackAndForth(Family):
         )
         return Case(reference, q0, motion, claims, robot=arm)
 
-
-def _path(where: SetUp, yaw: float, pace: float) -> Reference:
-    turned, target = pin.utils.rotate("z", yaw), pin.utils.rotate("x", where.roll)
-    first = turned @ (where.scale * START_M)
-    offset = turned @ (where.scale * (STOP_M - START_M))
-    up, forward = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
-
-    def rotation(share: float) -> Array:
-        inclined: Array = pin.utils.rotate("z", yaw + pi / 4 * (1 + share)) @ pin.utils.rotate(
-            "x", pi / 4 * share
+    def _largest(self, robot: Robot, change: Perturbation) -> Case:
+        """Make the largest sweep about the start of a robot that certifies."""
+        reason = ""
+        for share in SHARES:
+            try:
+                case = self._about_start(robot, change, share)
+                Certificate(case.claims).check(robot.name)
+            except DikbenchError as error:
+                reason = str(error)
+                continue
+            return case
+        raise DikbenchError(
+            f"no sweep about the start of robot {robot.name} can be followed; the smallest one "
+            f"tried: {reason}"
         )
-        return inclined
+
+    def _about_start(self, robot: Robot, change: Perturbation, share: float) -> Case:
+        """Make the sweep whose middle is the start, a share of the reach and of its rotation."""
+        start, tilt = placement_of(robot, robot.q0), 1.0 if 2 in robot.movable_rows else 0.0
+        scale, turn = share * robot.reach_of(start), share * pi / 4
+        x, y, _ = start.translation - robot.shoulder
+        # The middle of the original is in the direction y from the base.
+        yaw = float(np.arctan2(y, x)) - pi / 2 + float(pin.log3(change.rotation(robot))[2])
+        offset = scale * pin.utils.rotate("z", yaw) @ ((STOP_M - START_M) * [1.0, 1.0, tilt])
+        first = start.translation - offset / 2
+        target = _rotation(0.5, yaw, turn, tilt).T @ start.rotation
+        reference = _path(first, offset, yaw, target, change.pace, turn, tilt)
+        q0 = solve_placement(robot, reference.placement(0.0), robot.q0)
+        motion = self.exact_motion(robot, reference, q0)
+        claims = (
+            Claim("scale of the path", scale, at_least=SMALLEST_SCALE),
+            *usual_claims(motion, speed=(-inf, 1.0), sigma_min=0.03, margin=0.05),
+        )
+        return Case(reference, q0, motion, claims)
+
+
+def _sweep(robot: Robot, motion: OracleMotion) -> float:
+    """Compute the largest distance [m] of the task frame from where it starts."""
+    points = np.array([placement_of(robot, q).translation for q in motion.q[::4]])
+    return float(np.linalg.norm(points - points[0], axis=1).max())
+
+
+def _rotation(share: float, yaw: float, turn: float, tilt: float) -> Array:
+    """Compute the rotation of the path (3, 3) at a share of the sweep (see `_path`)."""
+    inclined: Array = pin.utils.rotate("z", yaw + turn * (1 + share)) @ pin.utils.rotate(
+        "x", turn * tilt * share
+    )
+    return inclined
+
+
+def _path(
+    first: Array,
+    offset: Array,
+    yaw: float,
+    target: Array,
+    pace: float,
+    turn: float = pi / 4,
+    tilt: float = 1.0,
+) -> Reference:
+    """Sweep from a point and back.
+
+    Args:
+        first: the first point, (3,) [m].
+        offset: from it to the last one, (3,) [m].
+        yaw: turns the orientations about the vertical [rad].
+        target: R_t, (3, 3).
+        pace: factor on the time.
+        turn: rotation of the sweep about the vertical [rad].
+        tilt: rotation about the path's x over it.
+    """
+    up, forward = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
 
     def placement(tau: float) -> Any:
         share = float(np.sin(tau / pace)) ** 2
-        return pin.SE3(rotation(share) @ target, first + share * offset)
+        return pin.SE3(_rotation(share, yaw, turn, tilt) @ target, first + share * offset)
 
     def velocity(tau: float) -> Array:
         share = float(np.sin(tau / pace)) ** 2
         rate = float(np.sin(2 * tau / pace)) / pace
-        inclined = rotation(share)
+        inclined = _rotation(share, yaw, turn, tilt)
         # Rz(a) Rx(b) turns at a' about the vertical and at b' about its own x.
-        world = np.array([offset, pi / 4 * (up + inclined @ forward)])
+        world = np.array([offset, turn * (up + tilt * (inclined @ forward))])
         twist: Array = rate * (world @ inclined @ target).ravel()
         return twist
 

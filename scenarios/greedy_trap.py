@@ -13,7 +13,7 @@ from dikbench.problem import Array, Drawn, Range, Robot
 from dikbench.scenario import (
     Case,
     Claim,
-    Family,
+    NamedRobotFamily,
     Perturbation,
     Variation,
     joint_oracle,
@@ -27,7 +27,7 @@ PEAK_SPEED_SHARE = 0.8
 
 
 @dataclass(frozen=True, kw_only=True)
-class GreedyTrap(Family):
+class GreedyTrap(NamedRobotFamily):
     """A local minimum by design: one joint with limits 0 and 2 pi, its goal the other way round.
 
     From q = start the orientation of q = goal is nearer through 0, where the limit is, than through
@@ -47,7 +47,6 @@ class GreedyTrap(Family):
     """
 
     robot: Literal["planar1r"] = "planar1r"
-    frame: None = None
     gain: float = 2.0
     start: Annotated[float, Range(0.3, 1.2, "rad"), Drawn(0.4, 1.0)] = 0.5
     goal: Annotated[float, Range(4.9, 6.0, "rad"), Drawn(5.1, 5.8)] = 5.5

@@ -16,7 +16,7 @@ from dikbench.problem import Array, Drawn, Kinematics, PositionTask, Range, Robo
 from dikbench.scenario import (
     Case,
     Claim,
-    Family,
+    NamedRobotFamily,
     OracleMotion,
     Perturbation,
     Reference,
@@ -66,7 +66,7 @@ SET_UPS: Mapping[str, SetUp] = MappingProxyType(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hexagon(Family):
+class Hexagon(NamedRobotFamily):
     """The position follows a hexagon at constant speed; the orientation is free.
 
     A straight line from the start to the top of a hexagon of radius 0.2 m, then clockwise from
@@ -93,7 +93,6 @@ class Hexagon(Family):
     """
 
     robot: Literal["lwr", "planar4r"] = "lwr"
-    frame: None = None
     dt: float = 0.001
     speed: Annotated[float, Range(0.05, 2.0, "m/s"), Drawn(0.2, 1.2)] = 0.5
     laps: Annotated[int, Range(1, 5)] = 2

@@ -24,7 +24,7 @@ from dikbench.scenario import (
     POSTURE_WEIGHT,
     Case,
     Claim,
-    Family,
+    NamedRobotFamily,
     OracleMotion,
     Perturbation,
     Variation,
@@ -51,7 +51,7 @@ CENTRE_WEIGHT = 1e-2
 
 
 @dataclass(frozen=True, kw_only=True)
-class Humanoid(Family):
+class Humanoid(NamedRobotFamily):
     """A humanoid on both feet draws a circle with its right hand: 36 velocities, four tasks.
 
     The base is free: only the two pose tasks of the feet, of the same priority as the hand's (and a
@@ -77,7 +77,6 @@ class Humanoid(Family):
     """
 
     robot: Literal["talos-humanoid"] = "talos-humanoid"
-    frame: None = None
     acceleration: Literal[False] = False
     speed: Annotated[float, Range(0.05, 0.9), Drawn(0.1, 0.7)] = 0.3
     radius: Annotated[float, Range(0.02, 0.15, "m"), Drawn(0.05, 0.12)] = 0.1

@@ -11,7 +11,7 @@ from dikbench.problem import Drawn, Range, Robot
 from dikbench.scenario import (
     Case,
     Claim,
-    Family,
+    NamedRobotFamily,
     Perturbation,
     Variation,
     at_constant_rate,
@@ -32,7 +32,7 @@ BRAKING_DISTANCES = 1.25
 
 
 @dataclass(frozen=True, kw_only=True)
-class JointLimitApproach(Family):
+class JointLimitApproach(NamedRobotFamily):
     """A joint that moves towards its limit and beyond, at a share of its velocity limit.
 
     The joint moves at a constant rate v = speed v_max, from 1.25 braking distances v^2/(2 a) (and
@@ -57,7 +57,6 @@ class JointLimitApproach(Family):
     """
 
     robot: Literal["ur5", "ur3", "ur10"] = "ur5"
-    frame: None = None
     acceleration: Literal[False] = False
     dt: float = 0.005
     joint: Annotated[Literal["pan", "wrist_3"], Drawn()] = "pan"

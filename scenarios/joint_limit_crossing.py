@@ -15,7 +15,7 @@ from dikbench.problem import Array, Drawn, Range, Robot
 from dikbench.scenario import (
     Case,
     Claim,
-    Family,
+    NamedRobotFamily,
     Perturbation,
     Variation,
     joint_oracle,
@@ -56,7 +56,7 @@ CROSSINGS: Mapping[str, Crossing] = MappingProxyType(
 
 
 @dataclass(frozen=True, kw_only=True)
-class JointLimitCrossing(Family):
+class JointLimitCrossing(NamedRobotFamily):
     """A path whose exact joint motion crosses a position limit and comes back.
 
     One joint j moves as q_j(t) = q_max,j - approach + (approach + depth) sin^2(pi t/T), the others
@@ -82,7 +82,6 @@ class JointLimitCrossing(Family):
     robot: Literal["ur5", "panda", "ur3", "ur10", "xarm7", "tiago", "talos", "lwr", "planar3r"] = (
         "ur5"
     )
-    frame: None = None
     approach: Annotated[float, Range(0.02, 3.0, "rad"), Drawn(0.1, 0.5)] = 0.3
     depth: Annotated[float, Range(0.02, 0.5, "rad"), Drawn(0.05, 0.4)] = 0.2
     speed: Annotated[float, Range(0.05, 1.0), Drawn(0.2, 0.9)] = 0.5

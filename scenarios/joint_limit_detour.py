@@ -16,7 +16,7 @@ from dikbench.problem import Array, Drawn, Kinematics, Range, Robot, null_space
 from dikbench.scenario import (
     Case,
     Claim,
-    Family,
+    NamedRobotFamily,
     Perturbation,
     Variation,
     joint_oracle,
@@ -62,7 +62,7 @@ LONGEST_WAY_RAD = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class JointLimitDetour(Family):
+class JointLimitDetour(NamedRobotFamily):
     """A path on which the least-norm motion leaves a joint's range; another motion keeps it.
 
     On an arm with seven joints, z in the null space of the task, the joints move as
@@ -87,7 +87,6 @@ class JointLimitDetour(Family):
     """
 
     robot: Literal["panda", "xarm7", "lwr", "tiago", "talos"] = "panda"
-    frame: None = None
     approach: Annotated[float, Range(0.02, 0.3, "rad"), Drawn(0.03, 0.15)] = 0.08
     depth: Annotated[float, Range(0.05, 0.3, "rad"), Drawn(0.06, 0.2)] = 0.12
     speed: Annotated[float, Range(0.05, 0.9), Drawn(0.2, 0.8)] = 0.5

@@ -13,7 +13,7 @@ from dikbench.problem import Drawn, Range, Robot
 from dikbench.scenario import (
     Case,
     Claim,
-    Family,
+    NamedRobotFamily,
     Perturbation,
     Variation,
     joint_oracle,
@@ -28,7 +28,7 @@ SAMPLES = 201
 
 
 @dataclass(frozen=True, kw_only=True)
-class JointLimitGraze(Family):
+class JointLimitGraze(NamedRobotFamily):
     """A path on which one joint comes within `gap` of its limit and turns back: it can be done.
 
     The joint j of `joint-limit-crossing` moves as
@@ -53,7 +53,6 @@ class JointLimitGraze(Family):
     robot: Literal["ur5", "panda", "ur3", "ur10", "xarm7", "tiago", "talos", "lwr", "planar3r"] = (
         "ur5"
     )
-    frame: None = None
     gap: Annotated[float, Range(0.001, 0.05, "rad"), Drawn(0.001, 0.05, log=True)] = 0.01
     approach: Annotated[float, Range(0.1, 1.0, "rad"), Drawn(0.2, 0.6)] = 0.4
     speed: Annotated[float, Range(0.05, 0.9), Drawn(0.2, 0.8)] = 0.5

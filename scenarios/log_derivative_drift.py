@@ -14,7 +14,7 @@ from dikbench.problem import Array, Drawn, PoseTask, Range, Robot
 from dikbench.scenario import (
     Case,
     Claim,
-    Family,
+    NamedRobotFamily,
     Perturbation,
     Reference,
     Time,
@@ -26,7 +26,7 @@ from dikbench.scenario import (
 
 
 @dataclass(frozen=True, kw_only=True)
-class LogDerivativeDrift(Family):
+class LogDerivativeDrift(NamedRobotFamily):
     """A square wave of poses for a mobile base: back by `distance` and turned by `turn`, twice.
 
     The target is the start for `hold` seconds, then `distance` behind it with a yaw of `turn`, then
@@ -50,7 +50,6 @@ class LogDerivativeDrift(Family):
     """
 
     robot: Literal["base"] = "base"
-    frame: None = None
     acceleration: Literal[False] = False
     distance: Annotated[float, Range(0.05, 1.0, "m"), Drawn(0.1, 0.5)] = 0.2
     turn: Annotated[float, Range(-3.0, 3.0, "rad"), Drawn(-3.0, -2.2)] = -0.9 * pi

@@ -105,10 +105,13 @@ class NearMiss(Family):
     def case(self, robot: Robot, change: Perturbation) -> Case:
         """See `Family`."""
         pace = self.speed / change.pace
-        if self.singularity == "auto" and self.robot not in SINGULAR_POSTURES:
+        # Its known postures are of all its joints and rows.
+        changed = self.rows is not None or bool(self.lock)
+        name = f"{self.robot} with other rows or joints" if changed else self.robot
+        if self.singularity == "auto" and name not in SINGULAR_POSTURES:
             passage = _first_found(robot, self.miss, pace, change)
         else:
-            known = _known(self.robot, self.singularity)
+            known = _known(name, self.singularity)
             seeded = pin.integrate(robot.model, pin.neutral(robot.model), np.array(known.posture))
             where = _perturbed(robot, make_singular(robot, seeded), change)
             passage = _passage(robot, where, self.miss, pace, known.half_length)

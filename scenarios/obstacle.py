@@ -170,7 +170,7 @@ class ObstacleInTheWay(Family):
         middle = robot.q0 if swing.middle is None else np.array(swing.middle)
         middle = change.posture(robot, middle)
         q0, at_one_second = _swing(robot, middle, swing, 1.0)
-        duration = duration_at(robot, at_one_second, q0, self.speed) * change.pace
+        duration = duration_at(robot, at_one_second, q0, self.speed, self.dt) * change.pace
         _, reference = _swing(robot, middle, swing, duration)
         return q0, reference, self.exact_motion(robot, reference, q0, most=100)
 

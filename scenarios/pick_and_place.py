@@ -63,7 +63,7 @@ class PickAndPlace(Family):
         check_can_lift(robot, self.robots)
         q0 = change.posture(robot, robot.q0)
         places = self._places(placement_of(robot, q0), change.rotation(robot))
-        duration = duration_at(robot, _path(places, 1.0), q0, self.speed)
+        duration = duration_at(robot, _path(places, 1.0), q0, self.speed, self.dt)
         reference = _path(places, duration)
         motion = self.exact_motion(robot, reference, q0)
         speed = (0.95 * self.speed, 1.05 * self.speed)

@@ -68,7 +68,7 @@ class SpeedSweep(Family):
         q0 = change.posture(robot, robot.q0)
         start, plane = placement_of(robot, q0), change.rotation(robot) @ plane_of(robot)
         curve = partial(CURVES[self.path], start, self.radius, plane=plane, turn=self.turn)
-        period = duration_at(robot, curve(1.0, 1.0), q0, self.speed)
+        period = duration_at(robot, curve(1.0, 1.0), q0, self.speed, self.dt)
         reference = curve(period, self.laps)
         motion = self.exact_motion(robot, reference, q0)
         speed = (0.95 * self.speed, 1.05 * self.speed)

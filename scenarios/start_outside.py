@@ -13,7 +13,7 @@ from dikbench.problem import Drawn, Range, Robot
 from dikbench.scenario import (
     Case,
     Claim,
-    Family,
+    NamedRobotFamily,
     Perturbation,
     Time,
     Variation,
@@ -43,7 +43,7 @@ JOINTS: Mapping[str, int] = MappingProxyType(
 
 
 @dataclass(frozen=True, kw_only=True)
-class StartOutside(Family):
+class StartOutside(NamedRobotFamily):
     """A start outside a position limit, as after a push or a calibration, and a slow way inside.
 
     One joint stands `outside` beyond its upper limit, the others as at the robot's start; the task
@@ -68,7 +68,6 @@ class StartOutside(Family):
     robot: Literal[
         "ur5", "ur3", "ur10", "panda", "xarm7", "kinova", "tiago", "talos", "planar3r"
     ] = "ur5"
-    frame: None = None
     outside: Annotated[float, Range(1e-4, 1e-2, "rad"), Drawn(5e-4, 1e-2, log=True)] = 5e-3
     rate: Annotated[float, Range(0.0, 0.5, "rad/s"), Drawn(0.02, 0.2)] = 0.05
     duration: Time = 2.0

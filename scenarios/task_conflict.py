@@ -26,8 +26,8 @@ from dikbench.problem import (
 from dikbench.scenario import (
     Case,
     Claim,
-    Family,
     Gain,
+    NamedRobotFamily,
     Perturbation,
     Variation,
     joint_oracle,
@@ -81,7 +81,7 @@ SELF_MOTION_STEPS = 50
 
 
 @dataclass(frozen=True, kw_only=True)
-class TaskConflict(Family):
+class TaskConflict(NamedRobotFamily):
     """A moving hand and an elbow with a target elsewhere, which tests priorities.
 
     The joints move as q(t) = q_a + (q_b - q_a) sin^2(pi t/T) and the hand follows with its position
@@ -104,7 +104,6 @@ class TaskConflict(Family):
     """
 
     robot: Literal["planar4r", "planar3r", "panda"] = "planar4r"
-    frame: None = None
     speed: Annotated[float, Range(0.05, 0.9), Drawn(0.1, 0.7)] = 0.3
     second_gain: Gain = 2.0
 

@@ -42,7 +42,7 @@ def load_robot(
     *,
     start: object = None,
     rows: str | None = None,
-    lock: Locked = (),
+    lock: Locked | None = None,
     root: Root = "fixed",
     velocity: LimitNumbers | None = None,
     acceleration: LimitNumbers | None = None,
@@ -179,12 +179,12 @@ def _from_urdf(path: str, frame: str | None, root: Root) -> Robot:
     return replace(robot, q0=robot.inside(robot.q0))
 
 
-def _positions(robot: Robot, lock: Locked) -> dict[str, float | None]:
+def _positions(robot: Robot, lock: Locked | None) -> dict[str, float | None]:
     """Read which joints are locked, and where if that is given."""
     if isinstance(lock, Mapping):
         return dict(lock)
     found: dict[str, float | None] = {}
-    for item in lock.split() if isinstance(lock, str) else lock:
+    for item in lock.split() if isinstance(lock, str) else lock or ():
         name, equals, value = str(item).partition("=")
         try:
             found[name] = float(value) if equals else None

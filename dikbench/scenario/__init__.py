@@ -36,6 +36,7 @@ from dikbench.scenario.building import (
     JointMotion,
     at_constant_rate,
     check_can_lift,
+    check_velocity_limits,
     collision_claims,
     duration_at,
     from_rest_to_rest,
@@ -51,8 +52,9 @@ from dikbench.scenario.building import (
     there_and_back,
     usual_claims,
 )
-from dikbench.scenario.certificate import Certificate, Claim
+from dikbench.scenario.certificate import Certificate, CertificateFailed, Claim
 from dikbench.scenario.family import Case, Family, Gain, Time
+from dikbench.scenario.named_robots import NamedRobotFamily
 from dikbench.scenario.obstacle_file import read_obstacles
 from dikbench.scenario.oracle import (
     OracleMotion,
@@ -88,6 +90,7 @@ __all__ = [
     "Case",
     "CentreOfMassTask",
     "Certificate",
+    "CertificateFailed",
     "Claim",
     "CollisionConstraint",
     "Constraint",
@@ -98,6 +101,7 @@ __all__ = [
     "Kind",
     "Kinematics",
     "Mask",
+    "NamedRobotFamily",
     "Obstacle",
     "OracleMotion",
     "OrientationTask",
@@ -124,6 +128,7 @@ __all__ = [
     "at_constant_rate",
     "body_twist",
     "check_can_lift",
+    "check_velocity_limits",
     "circle",
     "collision_claims",
     "damped_least_squares",

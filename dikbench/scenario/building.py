@@ -30,6 +30,12 @@ POSTURE_WEIGHT = 1e-4
 """Weight of the secondary posture task: large enough to choose a posture in the null space, too
 small to affect the pose visibly."""
 
+LEAST_PERIODS = 20
+"""Smallest number of control periods in a motion."""
+
+LEAST_PEAK = 0.95
+"""Smallest share of a motion's peak speed that its samples at the control steps must see."""
+
 
 def limits_in_force(robot: Robot, *, acceleration: bool) -> Robot:
     """Return the robot with its acceleration limits in force, or without.
@@ -93,7 +99,9 @@ def placement_of(robot: Robot, q: Array) -> pin.SE3:
     return kinematics.placement(robot.frame_id).copy()
 
 
-def duration_at(robot: Robot, at_one_second: Reference, q0: Array, speed: float) -> float:
+def duration_at(
+    robot: Robot, at_one_second: Reference, q0: Array, speed: float, dt: float
+) -> float:
     """Compute the duration [s] for which the exact joint motion peaks at `speed` over limits.
 
     Args:
@@ -101,17 +109,38 @@ def duration_at(robot: Robot, at_one_second: Reference, q0: Array, speed: float)
         at_one_second: the motion done in one second; joint speeds are proportional to 1/duration.
         q0: configuration at its beginning, (nq,).
         speed: peak of the joint speeds over their limits.
+        dt: control period [s].
 
     Raises:
-        DikbenchError: if no joint that moves has a limit.
+        DikbenchError: if no joint that it moves has a velocity limit, or the motion takes so few
+            control periods that they miss its peak.
     """
+    check_velocity_limits(robot, "the duration")
     motion = oracle_motion(robot, at_one_second, q0, np.linspace(0.0, 1.0, 201))
-    if motion.peak_speed_ratio == 0:
+    duration = motion.peak_speed_ratio / speed
+    periods = duration / dt
+    stride = max(1, round(200 / max(periods, 1.0)))
+    sampled = measure_motion(robot, motion.instants[::stride], motion.q[::stride])
+    if periods < LEAST_PERIODS or sampled.peak_speed_ratio < LEAST_PEAK * motion.peak_speed_ratio:
         raise DikbenchError(
-            f"robot {robot.name}: no joint that moves has a velocity limit; "
-            "valid: velocity=..., such as velocity=2 [rad/s]"
+            f"at speed={speed:g} the motion takes {duration:.3g} s, {periods:.3g} control periods "
+            f"of dt={dt:g} s, too few to follow it; give a smaller dt or a lower speed"
         )
-    return motion.peak_speed_ratio / speed
+    return duration
+
+
+def check_velocity_limits(robot: Robot, what: str) -> None:
+    """Check that a joint that moves the task frame has a velocity limit, from which `what` follows.
+
+    Raises:
+        DikbenchError: if none has.
+    """
+    limit = robot.limits.velocity
+    if limit is None or not np.isfinite(limit.upper[robot.chain]).any():
+        raise DikbenchError(
+            f"robot {robot.name} has no velocity limits, from which {what} follows: give "
+            "velocity=... [rad/s or m/s]"
+        )
 
 
 def least_norm_share(robot: Robot, q: Array, joint: int, tracking: TrackingTask = POSE) -> float:

@@ -124,7 +124,7 @@ class Family(Parameters, ABC):
     robot: str = "panda"
     frame: str | None = None
     rows: str | None = None
-    lock: str = ""
+    lock: str | None = None
     root: Root = "fixed"
     velocity: float | str | None = None
     gain: Gain = 5.0
@@ -232,6 +232,14 @@ class Family(Parameters, ABC):
         if made.feasible == "unknown" and (reason := infeasible_because(made)):
             return replace(made, feasible="no", infeasible_because=reason)
         return made
+
+    @property
+    def as_catalogued(self) -> bool:
+        """Whether the robot is in the catalogue, with its frame, rows and joints as they are there.
+
+        Only then postures and directions that are known for its name are its own.
+        """
+        return self.robot in ROBOTS and self.frame is None and self.rows is None and not self.lock
 
     def _arm(self) -> Robot:
         """Load the robot, with its limits in force.

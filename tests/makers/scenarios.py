@@ -139,7 +139,7 @@ def scenario_error(selector: str) -> str:
 def put_robot(monkeypatch: pytest.MonkeyPatch, robot: object) -> None:
     """Make every family find this robot, whatever the name that it asks for."""
     module = sys.modules["dikbench.scenario.family"]
-    monkeypatch.setattr(module, "load_robot", lambda name, frame, **given: robot)
+    monkeypatch.setattr(module, "load_robot", lambda *_, **__: robot)
 
 
 @cache

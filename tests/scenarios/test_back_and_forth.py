@@ -132,7 +132,7 @@ def test_a_path_out_of_reach_is_an_error(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_errors_say_what_is_valid() -> None:
     """One line each."""
     for selector, words in (
-        ("back-and-forth[robot=talos]", "valid: ur3, ur5, ur10, panda"),
+        ("back-and-forth[robot=base]", "no sweep about the start of robot base can be followed"),
         ("back-and-forth[dt=-1]", "dt=-1.0 must be finite and above 0"),
     ):
         with pytest.raises(DikbenchError) as caught:

@@ -231,7 +231,7 @@ def test_an_arm_that_stays_unfolded_does_not_certify(monkeypatch: pytest.MonkeyP
         ("obstacle[shape=cone]", "sphere, capsule, box"),
         ("obstacle[speed=2]", "speed=2.0 must be 0.05 to 0.9"),
         ("self-collision[speed=0]", "speed=0.0 must be 0.05 to 0.9"),
-        ("self-collision[robot=base]", "panda"),
+        ("self-collision[robot=base]", "robot base has no velocity limits"),
     ],
 )
 def test_what_cannot_be_is_one_line(selector: str, part: str) -> None:

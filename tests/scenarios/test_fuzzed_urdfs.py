@@ -90,7 +90,7 @@ def one_arm(
 
 
 arms = st.lists(joints, min_size=1, max_size=8)
-grippers = st.one_of(st.just([]), st.lists(joints, min_size=1, max_size=2))
+grippers = st.lists(joints, max_size=2)
 suppressed = [HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
 
 

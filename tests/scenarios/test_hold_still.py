@@ -100,7 +100,7 @@ def test_postures_that_are_not_near_are_refused(monkeypatch: pytest.MonkeyPatch)
 @pytest.mark.parametrize(
     ("selector", "words"),
     [
-        ("hold-still[robot=talos]", "valid: panda, ur3, ur5, ur10"),
+        ("hold-still[robot=base,posture=singular]", "robot base has no posture=singular"),
         ("hold-still[posture=elbow]", "valid: start, singular, limit"),
         ("hold-still[gain=0]", "gain=0.0 must be finite and above 0"),
     ],

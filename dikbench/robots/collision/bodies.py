@@ -35,6 +35,8 @@ def collision_bodies(robot: Robot) -> Any:
     """
     bodies = _from_urdf(robot) if robot.urdf else _along_links(robot.model)
     if not len(bodies.geometryObjects):
+        if robot.urdf:
+            raise DikbenchError(f"robot {robot.name}: the URDF has no collision geometry")
         raise DikbenchError(f"robot {robot.name}: no collision geometry and no links are known")
     return bodies
 

@@ -268,7 +268,7 @@ def test_a_parameter_with_one_value_is_not_offered() -> None:
     """A family that fixes its frame says so where one is given, and lists it nowhere."""
     assert make_scenario("greedy-trap[robot=planar1r]").robot.name == "planar1r"
     assert "frame='tool0' is not valid" in error_of(make_scenario, "hexagon[frame=tool0]")
-    assert "frame" not in error_of(make_scenario, "step[frme=tool0]").partition("valid:")[2]
+    assert "frame" not in error_of(make_scenario, "hexagon[frme=tool0]").partition("valid:")[2]
 
 
 def test_the_values_of_a_selector_s_parameters() -> None:
