@@ -196,7 +196,7 @@ def test_an_obstacle_that_is_met_at_once_does_not_certify(monkeypatch: pytest.Mo
     short = {"hand": {"panda": replace(module.SWINGS["hand"]["panda"], amplitude=0.05)}}
     monkeypatch.setattr(module, "SWINGS", short)
     with pytest.raises(DikbenchError, match=r"distance at the start .*, must be"):
-        make_scenario("obstacle")
+        make_scenario("obstacle[dt=0.002]")
 
 
 def test_an_elbow_that_cannot_turn_away_does_not_certify(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -224,8 +224,8 @@ def test_an_arm_that_stays_unfolded_does_not_certify(monkeypatch: pytest.MonkeyP
             "obstacle[robot=kinova,where=elbow]",
             "robot=kinova with where=elbow; valid: panda, xarm7, lwr",
         ),
-        (f"obstacle[robot={DATA / 'base.urdf'},frame=tool]", "base: no collision geometry"),
-        ("obstacle[robot=panda,velocity=inf]", "no joint that moves has a velocity limit"),
+        (f"obstacle[robot={DATA / 'base.urdf'},frame=tool]", "base: the URDF has no collision geometry"),
+        ("obstacle[robot=panda,velocity=inf]", "has no velocity limits, from which the duration follows"),
         ("obstacle[robot=ur5,where=elbow]", "valid: panda, xarm7, lwr"),
         ("obstacle[depth=0.2]", "depth=0.2 must be 0.01 to 0.05"),
         ("obstacle[shape=cone]", "sphere, capsule, box"),
