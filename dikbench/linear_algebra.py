@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from math import prod
 from typing import Literal
 
 import numpy as np
-from scipy.linalg.lapack import dgeqrf, dgesdd, dposv
+from scipy.linalg.lapack import dgeqrf, dgesdd, dpocon, dposv
 from scipy.optimize import nnls
 
 from dikbench.arrays import Array
 
 Projector = Literal["exact", "damped"]
 
-SMALLEST_PIVOT_RATIO = 1e-4
-"""A Gram matrix whose smallest pivot is a smaller share of its largest is ill-conditioned."""
+LEAST_CONDITION = 1e-8
+"""A Gram matrix is ill-conditioned where the reciprocal of its condition number is smaller: half of
+the digits are lost."""
 
 
 NO_ROW = 1e-12
@@ -77,9 +79,13 @@ def damped_least_squares(A: Array, b: Array, squared_damping: float) -> Array:
     m, n = A.shape
     damped = A.dot(A.T) if m <= n else A.T.dot(A)
     damped.flat[:: len(damped) + 1] += squared_damping
+    trace, size = float(damped.trace()), len(damped)
     factor, y, info = dposv(damped, b if m <= n else b.dot(A))
-    pivots = factor.diagonal().tolist()  # their ratio bounds the condition number, from below
-    if info or min(pivots) < SMALLEST_PIVOT_RATIO * max(pivots):
+    # The smallest eigenvalue is at least det ((size - 1)/trace)^(size - 1): the geometric mean of
+    # the others is at most their arithmetic one.
+    determinant = prod(factor.diagonal().tolist()) ** 2
+    surely = determinant * (size - 1) ** (size - 1) >= LEAST_CONDITION * trace**size
+    if info or (not surely and dpocon(factor, trace)[0] < LEAST_CONDITION):
         lost = np.finfo(float).eps * max(m, n) * float(np.linalg.norm(A))
         return DampedInverse(A, lost, squared_damping**0.5).times(b)
     x: Array = y.dot(A) if m <= n else y

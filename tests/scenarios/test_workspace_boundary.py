@@ -122,7 +122,7 @@ def test_a_target_within_reach_is_refused(monkeypatch: pytest.MonkeyPatch) -> No
 def test_a_boundary_that_is_a_limit_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the elbow's limit comes before the stretched arm."""
     put_robot(monkeypatch, with_upper_limit("panda", 3, -0.6))
-    with pytest.raises(DikbenchError, match="position margin up to there"):
+    with pytest.raises(DikbenchError, match="meets a joint limit at"):
         make_scenario("workspace-boundary")
 
 

@@ -95,5 +95,5 @@ def test_outcomes_that_did_not_occur_stand_in_the_csv_alone() -> None:
     table = outcome_table(make_rows({"a": {}, "b": {"outcome": "late"}}))
     shown = [table.columns[place].key for place in table.shown]
     assert shown[:3] == ["trials", "late", "success"]
-    assert len(table.columns) == 18
+    assert len(table.columns) == 19
     assert outcome_table(make_rows({"a": {}}).assign(feasible="", outcome="")).blocks == ()
