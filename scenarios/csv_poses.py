@@ -86,9 +86,10 @@ class CsvPoses(Family):
 
     Obstacles are those of a TOML file with tables [[sphere]] (centre, radius), [[capsule]] (start,
     end, radius) and [[box]] (centre, size, rotation), in metres in the world; the start is claimed
-    to keep the margin from them, the exact motion may run into them. A payload is a ball of 5 cm
-    radius in the hand; with one, effort limits and torque constraints are in force. A seed changes
-    the pace by up to 10 %.
+    to keep the margin from them, the exact motion may run into them; whether the arm collides with
+    itself is not looked at. A payload is a ball of 5 cm radius in the hand; with one, effort limits
+    and torque constraints are in force, and it is claimed that they suffice to hold it at the
+    start. A seed changes the pace by up to 10 %.
 
     Provokes: what its file does
 
@@ -142,7 +143,7 @@ class CsvPoses(Family):
         if self.payload > 0:
             robot = with_payload(robot.with_limits(effort=robot.available_effort), self.payload)
             constraints.append(TorqueConstraint())
-            claims.append(_torque(robot, motion, rows))
+            claims += [_holding(robot, motion.q[0]), _torque(robot, motion, rows)]
         return Case(
             reference,
             motion.q[0],
@@ -268,6 +269,14 @@ def _distances(
         Claim("distance from obstacles at the start [m]", distances[0], constraint.margin),
         Claim(f"least distance of the exact motion, at line {line} [m]", distances[nearest]),
     )
+
+
+def _holding(arm: Robot, q: Array) -> Claim:
+    """Claim that the effort limits suffice to hold a configuration (nq,)."""
+    limit, rest = effort_limits(arm), np.zeros((1, arm.nv))
+    held = TorqueConstraint().torques(arm, q[None], rest, rest, 1.0)
+    usage = float(limit.usage(held).max())
+    return Claim("torque to hold the start over limit", usage, at_most=1.0)
 
 
 def _torque(arm: Robot, motion: OracleMotion, rows: _Rows) -> Claim:

@@ -128,15 +128,17 @@ class JointLimits:
 
     def _vector(self, kind: str, value: object) -> Array:
         try:
+            if isinstance(value, bool):
+                raise TypeError
             vector = np.asarray(value, dtype=float)
             if vector.ndim == 0:
                 vector = np.full(self.nv, float(vector))
         except (TypeError, ValueError):
             raise DikbenchError(f"{kind} limit: expected numbers, got {value!r}") from None
         if vector.shape != (self.nv,) or np.isnan(vector).any():
+            got = "NaN" if np.isnan(vector).any() else f"shape {vector.shape}"
             raise DikbenchError(
-                f"{kind} limit: expected a number or {self.nv} numbers without NaN, "
-                f"got shape {vector.shape}"
+                f"{kind} limit: expected a number or {self.nv} numbers without NaN, got {got}"
             )
         return np.where(np.abs(vector) > NO_LIMIT_MAGNITUDE, np.copysign(np.inf, vector), vector)
 

@@ -208,6 +208,12 @@ def _with_locked(robot: Robot, locked: Mapping[str, float | None]) -> Robot:
             raise unknown("joint", name, names, f"of robot {robot.name}")
         index = model.getJointId(name)
         joint = model.joints[index]
+        if joint.nv == 0:
+            pairs = zip(model.names, model.joints, strict=True)
+            leader = next(n for n, j in pairs if j.idx_v == joint.idx_v and j.nv)
+            raise DikbenchError(
+                f"robot {robot.name}: joint {name!r} follows {leader!r}; lock that one"
+            )
         if joint.nv != 1:
             raise DikbenchError(f"robot {robot.name}: joint {name!r} cannot be locked")
         indices.append(index)
@@ -224,10 +230,16 @@ def _with_locked(robot: Robot, locked: Mapping[str, float | None]) -> Robot:
         for index, joint in enumerate(model.joints)
         if joint.idx_v in gone_v and index not in indices
     ]
-    if np.any(robot.inside(q) != q):
-        raise DikbenchError(
-            f"robot {robot.name}: lock={dict(locked)} is outside the position limits"
-        )
+    position = limits.position
+    assert position is not None
+    outside = (robot.inside(q) != q)[limits.q_index] & (limits.q_index >= 0)
+    for name, value in locked.items():
+        k = model.joints[model.getJointId(name)].idx_v
+        if outside[k]:
+            raise DikbenchError(
+                f"robot {robot.name}: lock={name}={value:g} is outside the position limits, "
+                f"{position.lower[k]:g} to {position.upper[k]:g}"
+            )
     reduced = pin.buildReducedModel(model, sorted(indices), q)
     kept_q = np.setdiff1d(np.arange(model.nq), list(gone_q))
     kept_v = np.setdiff1d(np.arange(model.nv), list(gone_v))

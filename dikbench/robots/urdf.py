@@ -36,6 +36,8 @@ def urdf_model(path: str, root: Root = "fixed") -> tuple[Any, list[UrdfJoint]]:
         DikbenchError: if the file is missing, is no URDF, or has a joint or a mass that makes no
             sense; the message names it.
     """
+    if os.path.isdir(path):
+        raise DikbenchError(f"robot file {path} is a folder; valid: the .urdf file in it")
     if not os.path.isfile(path):  # unlike Path.is_file, False for a name that is too long
         raise DikbenchError(f"robot file not found: {path}")
     if root not in get_args(Root):
@@ -108,6 +110,8 @@ def _joint(element: ElementTree.Element) -> UrdfJoint:
         if element.get("type") != "continuous":
             lower, upper = (_number(limit, side, where) for side in ("lower", "upper"))
         for what in ("velocity", "effort"):
+            if limit.get(what) is None:
+                raise DikbenchError(f"{where} has a limit without {what}; valid: 0 for none")
             if _number(limit, what, where) < 0:
                 raise DikbenchError(f"{where} has a negative {what} limit")
         velocity = _number(limit, "velocity", where) or inf

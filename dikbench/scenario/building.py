@@ -18,10 +18,14 @@ from dikbench.linear_algebra import pseudo_inverse
 from dikbench.problem.tasks import PostureTask, Task, TrackingTask
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.robot import Robot
+from dikbench.robots.task_rows import ALL_ROWS, rows_in_words
 from dikbench.scenario.certificate import Claim
 from dikbench.scenario.oracle import POSE, OracleMotion, measure_motion, oracle_motion
 from dikbench.scenario.reference.reference import Reference
 from dikbench.scenario.steps import steps_in
+
+DEPENDENT = 1e-6
+"""Singular values (m, rad) below this are of rows that depend on each other."""
 
 JointMotion = tuple[Callable[[float], Array], Callable[[float], Array]]
 """tau [s] -> configuration (nq,), and tau -> its derivative (nv,) [rad/s or m/s]."""
@@ -59,6 +63,31 @@ def acceleration_asked(value: bool | float | str) -> tuple[bool, float | str | N
     if word in ("true", "false"):
         return word == "true", None
     return True, value
+
+
+def check_rows(robot: Robot) -> None:
+    """Check that a robot has as many joints as it is asked for rows, and moves them independently.
+
+    Raises:
+        DikbenchError: if it does not at its start, which of a URDF is the best of many postures.
+    """
+    rows = rows_in_words(robot.task_rows, robot.task_axes)
+    if len(robot.chain) < len(robot.task_rows):
+        wanted = "a pose" if robot.task_rows == ALL_ROWS else f"rows={rows}"
+        raise DikbenchError(
+            f"frame {robot.frame} is moved by {len(robot.chain)} joints, {wanted} has "
+            f"{len(robot.task_rows)} rows: give rows=..., at most as many as joints, such as "
+            "rows=xyz for the position alone"
+        )
+    kinematics = Kinematics(robot)
+    kinematics.update(robot.q0)
+    J = kinematics.task_jacobian()
+    rank = int(np.linalg.matrix_rank(J, tol=DEPENDENT))
+    if rank < len(J):
+        raise DikbenchError(
+            f"of the {len(J)} rows {rows} of frame {robot.frame} its {len(robot.chain)} joints "
+            f"move {rank} independently; give other rows=..., at most {rank}"
+        )
 
 
 def influence_distance(robot: Robot) -> float:

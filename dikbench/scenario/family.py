@@ -21,6 +21,7 @@ from dikbench.robots.robot import Robot
 from dikbench.robots.urdf import Root
 from dikbench.scenario.building import (
     acceleration_asked,
+    check_rows,
     limits_in_force,
     samples,
     secondary_tasks,
@@ -245,7 +246,7 @@ class Family(Parameters, ABC):
         """Load the robot, with its limits in force.
 
         Raises:
-            DikbenchError: if there is none, or fewer joints move its frame than rows are asked for.
+            DikbenchError: if there is none, or its joints cannot move the rows that are asked for.
         """
         in_force, by_hand = acceleration_asked(self.acceleration)
         arm = load_robot(
@@ -257,13 +258,8 @@ class Family(Parameters, ABC):
             velocity=self.velocity,
             acceleration=by_hand,
         )
-        if self.robot not in ROBOTS and len(arm.chain) < len(arm.task_rows):
-            wanted = "a pose" if self.rows is None else f"rows={self.rows}"
-            raise DikbenchError(
-                f"frame {arm.frame} is moved by {len(arm.chain)} joints, {wanted} has "
-                f"{len(arm.task_rows)} rows: give rows=..., at most as many "
-                "as joints, such as rows=xyz for the position alone"
-            )
+        if self.robot not in ROBOTS:
+            check_rows(arm)
         return limits_in_force(arm, acceleration=in_force)
 
     def exact_motion(

@@ -239,12 +239,14 @@ def test_own_obstacles_are_kept_clear_of_on_the_way(tmp_path: Path) -> None:
 def test_a_payload_puts_torque_limits_in_force() -> None:
     """The torques of the exact motion grow with it, and formulations are held to the limits."""
     plain = make_scenario(f"csv[file={TRIANGLE}]")
-    light, heavy = (make_scenario(f"csv[file={TRIANGLE},payload={mass}]") for mass in (1, 12))
+    light, heavy = (make_scenario(f"csv[file={TRIANGLE},payload={mass}]") for mass in (1, 11.2))
     assert not plain.limits_torques
     assert plain.robot.limits.effort is None
     usage = [_claims(each)["required torque over limit"][1] for each in (light, heavy)]
     assert usage[0] < 0.5 < 1.0 < usage[1]
     assert 0.9 * usage[0] < metrics_of("qp", light)["torque_usage_max"] < 1.0
+    message = scenario_error(f"csv[file={TRIANGLE},payload=12]")
+    assert "torque to hold the start over limit = 1.053, must be <= 1" in message
 
 
 def test_a_robot_from_a_urdf_file_does_it_too() -> None:

@@ -14,6 +14,7 @@ from makers.urdfs import DATA, SIX, Joint, write_arm
 
 import dikbench
 from dikbench.errors import DikbenchError
+from dikbench.plugins.building import make_scenario
 from dikbench.problem import Array, Kinematics, Robot
 from dikbench.robots.collision.obstacles import SphereObstacle
 from dikbench.robots.collision.pairs import CollisionPairs
@@ -222,6 +223,7 @@ BAD_JOINTS = {
     "mimics 'to_tool', which does not move": Joint(mimic='joint="to_tool"'),
     "mimics 'nobody', which does not move": Joint(mimic='joint="nobody"'),
     "multiplier='twice' is not a number": Joint(mimic='joint="j1" multiplier="twice"'),
+    "has a limit without velocity": Joint(limit='lower="-1" upper="1" effort="1"'),
     "has a negative velocity limit": Joint(limit='lower="-1" upper="1" velocity="-1" effort="1"'),
     "no position is inside the limits of both": Joint(mimic='joint="j1" offset="10"'),
     "has the axis '0 0 nan'": Joint("0 0 nan"),
@@ -313,7 +315,7 @@ def test_locked_joints_do_not_move(tmp_path: Path) -> None:
     ("lock", "message"),
     [
         ("j9", "unknown joint 'j9' of robot arm"),
-        ("j1=9", "is outside the position limits"),
+        ("j1=9", "lock=j1=9 is outside the position limits, -3 to 3"),
         ("j1=x", "lock='j1=x' is not valid"),
         ("j1 j2 j3 j4 j5 j6", "all joints are locked"),
     ],
@@ -323,6 +325,24 @@ def test_a_lock_that_makes_no_sense(lock: str, message: str, tmp_path: Path) -> 
     with pytest.raises(DikbenchError) as caught:
         load_robot(write_arm(tmp_path, SIX), "tool", lock=lock)
     assert message in str(caught.value)
+
+
+def test_a_follower_is_locked_by_the_joint_that_it_follows(tmp_path: Path) -> None:
+    """It has no position of its own; a folder is no robot, and `True` no limit."""
+    path = write_arm(tmp_path, (*SIX, Joint(mimic='joint="j6"')))
+    with pytest.raises(DikbenchError, match="joint 'j7' follows 'j6'; lock that one"):
+        load_robot(path, "tool", lock="j7")
+    with pytest.raises(DikbenchError, match="is a folder"):
+        load_robot(str(tmp_path), "tool")
+    with pytest.raises(DikbenchError, match="effort limit: expected numbers, got True"):
+        load_robot(path, "tool").with_limits(effort=True)
+
+
+def test_rows_that_depend_on_each_other_are_refused() -> None:
+    """Three turns and two lines are too much for the wrist of these five joints."""
+    at = f"robot={DATA / 'five_dof.urdf'},frame=tool"
+    with pytest.raises(DikbenchError, match="its 5 joints move 4 independently"):
+        make_scenario(f"reach[{at},rows=xyrxryrz]")
 
 
 def test_limits_by_hand(tmp_path: Path) -> None:

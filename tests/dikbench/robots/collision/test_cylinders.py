@@ -39,7 +39,8 @@ def gap(first: pin.SE3, second: pin.SE3, directions: Array) -> Array:
         local = along @ placement.rotation
         across = np.hypot(local[:, 0], local[:, 1])
         far: Array = RADIUS * across + LENGTH / 2 * np.abs(local[:, 2])
-        return far + along @ placement.translation
+        extent: Array = far + along @ placement.translation
+        return extent
 
     apart: Array = -support(second, -directions) - support(first, directions)
     return apart
