@@ -77,9 +77,11 @@ def _draw(rows: pd.DataFrame, names: list[str], target: Path, file: str) -> str:
     axes[0, 0].set_ylim(len(names) - 0.5, -0.5)
     handles = [
         Patch(facecolor=each.colour, edgecolor="0.5", linewidth=0.4, label=each.name)
-        for each in CATEGORIES
+        for place, each in enumerate(CATEGORIES)
+        if rows["category"].eq(place).any()
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), columnspacing=1)
+    columns = len(handles) if len(handles) < len(CATEGORIES) else len(handles) // 2
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns, columnspacing=1)
     return save(figure, target, file)
 
 
