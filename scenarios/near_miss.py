@@ -13,6 +13,7 @@ import pinocchio as pin
 from dikbench.errors import DikbenchError
 from dikbench.problem import Array, Drawn, Kinematics, PoseTask, Range, Robot
 from dikbench.scenario import (
+    NEAR_SINGULARITY,
     SINGULAR_NEED,
     Case,
     Certificate,
@@ -117,7 +118,8 @@ class NearMiss(Family):
             passage = _passage(robot, where, self.miss, pace, known.half_length)
         motion = passage.motion
         # At a fold the smallest singular value is about the root of the distance.
-        singular = motion.peak_speed_ratio > SINGULAR_NEED
+        near = self.miss <= NEAR_SINGULARITY or motion.sigma_min.min() < NEAR_SINGULARITY
+        singular = near and motion.peak_speed_ratio > SINGULAR_NEED
         return Case(
             passage.reference,
             motion.q[0],

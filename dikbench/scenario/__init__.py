@@ -78,10 +78,11 @@ from dikbench.scenario.singularity import (
     make_singular,
     singular_postures,
 )
-from dikbench.scenario.situation import SINGULAR_NEED, Situation
+from dikbench.scenario.situation import NEAR_SINGULARITY, SINGULAR_NEED, Situation
 from dikbench.scenario.variation import Perturbation, Variation
 
 __all__ = [
+    "NEAR_SINGULARITY",
     "POSTURE_WEIGHT",
     "SINGULAR_NEED",
     "Array",

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Final, Literal, NamedTuple
 
+import numpy as np
+
 from dikbench.arrays import Array, Mask
 from dikbench.robots.limits import JointLimits
 from dikbench.robots.robot import Robot
@@ -73,9 +75,18 @@ def broken_limit(
     ]
     beyond = outside(robot, q, back_inside, POSITION_TOLERANCE)
     if (beyond > 0).any():
-        reason = "distance [rad or m] of a joint outside what it may be"
-        found.append(_first("limit-broken", beyond > 0, beyond, reason))
+        reason = "distance [rad or m] of a joint outside its range"
+        found.append(_first("limit-broken", beyond > 0, _out_of_range(robot.limits, q), reason))
     return min(found, key=lambda violation: violation.step) if found else None
+
+
+def _out_of_range(limits: JointLimits, q: Array) -> Array:
+    """Compute how far the farthest joint is outside its range, (n + 1,) [rad or m]."""
+    assert limits.position is not None
+    values = q[:, limits.q_index]
+    excess = np.maximum(values - limits.position.upper, limits.position.lower - values)
+    farthest: Array = np.where(limits.q_index >= 0, excess, -np.inf).max(axis=1)
+    return farthest
 
 
 def _shares(

@@ -67,7 +67,7 @@ def draw_phase_diagrams(ran: pd.DataFrame, target: Path) -> list[Figure]:
                     f"{one.explained} Scenarios {grid.family} ({grid.others or 'defaults'}), "
                     f"{how(grid.rows)}, a panel per formulation: the oracle, which moves along the "
                     f"path as asked for, then from the best to the worst{of}. Black: the trial "
-                    "failed."
+                    "broke off."
                 )
                 title = (
                     f"Phase diagram of {grid.family}, {grid.others or 'defaults'}: {one.title}{of}"

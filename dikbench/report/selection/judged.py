@@ -24,7 +24,8 @@ CONSTRAINED: Final[Situation] = "obstacles or torques"
 DEFINITIONS: Final[Mapping[Situation, str]] = MappingProxyType(
     {
         "near singularities": "the exact motion passes a smallest singular value below 0.05 "
-        "(m, rad) and needs more than 1.2 of a joint's speed limit",
+        "(m, rad), or a singular placement within 0.05 (m, rad), and needs more than 1.2 of a "
+        "joint's speed limit",
         "at joint limits": "the exact motion comes within 50 mrad of a position limit, or beyond",
         "beyond joint speed": "the exact motion needs more than a joint's speed limit, and is in "
         "none of the situations above",

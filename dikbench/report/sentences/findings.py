@@ -227,7 +227,8 @@ def unanswered(rows: pd.DataFrame, names: Names) -> Finding | None:
     return Finding(
         "No answer",
         f"{names.of(most)} posed programs without a feasible point, or got no answer, in up to "
-        f"{number(100 * worst.max())} % of a run's steps, and braked instead.",
+        f"{number(100 * worst.max())} % of a run's steps, and braked instead, in the trials that "
+        "count.",
     )
 
 

@@ -109,7 +109,7 @@ def summarise(trials: pd.DataFrame) -> Summary:
         *first_most_often(firsts, names),
         fastest(contenders, among, names),
         broke_off(contenders, names),
-        unanswered(contenders, names),
+        unanswered(every[~every["formulation"].isin(ORACLES)], names),
     )
     said = tuple(each for each in short if each)
     return Summary(_basis(trials), said, tuple(chapters), every["scenario"].nunique())

@@ -80,7 +80,7 @@ QUANTITIES: Final[Mapping[str, Quantity]] = MappingProxyType(
         "joint torque over its limit": Quantity(
             "joint torque over its limit", most=TORQUE_TOLERANCE, peak="torque_usage_max"
         ),
-        "distance [rad or m] of a joint outside what it may be": Quantity(
+        "distance [rad or m] of a joint outside its range": Quantity(
             "joint outside its range", "deg", DEGREES, POSITION_TOLERANCE,
             "position_violation_max_rad",
         ),

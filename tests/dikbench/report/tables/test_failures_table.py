@@ -95,7 +95,7 @@ def test_a_joint_outside_is_told_as_an_angle_and_as_a_length() -> None:
     """Its row does not say whether it turns; where it started outside, the start is no fault."""
     outside = {
         "outcome": "limit-broken",
-        "outcome_reason": "distance [rad or m] of a joint outside what it may be",
+        "outcome_reason": "distance [rad or m] of a joint outside its range",
         "outcome_figure": 0.01,
         "position_violation_max_rad": 0.2,
     }
