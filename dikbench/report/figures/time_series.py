@@ -65,8 +65,8 @@ def draw_time_series(
     shown = one_way(ran[ran["scenario"].eq(scenario)])
     caption = (
         f"{'; '.join(label[0].upper() + label[1:] for label in columns)} against time: {scenario}, "
-        f"{how(shown)}, one solver per law, from the best outcome to the worst, by the error within "
-        "each."
+        f"{how(shown)}, one solver per law, from the best outcome to the worst, by the error "
+        "within each."
     )
     return [Figure(file, caption, "Error and joint speed against time")]
 
