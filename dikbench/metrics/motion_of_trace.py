@@ -7,6 +7,7 @@ import numpy as np
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.metrics.motion import Motion
+from dikbench.problem.tasks.rows import orientation_error
 from dikbench.robots.kinematics import Kinematics, placements
 from dikbench.scenario.scenario import Scenario
 from dikbench.simulation.trace import Trace
@@ -34,26 +35,49 @@ def motion_of(trace: Trace, scenario: Scenario, jacobians: Array | None = None) 
         J[:n] = jacobians
     for k, q in enumerate(trace.q[known:], start=known):
         kinematics.update(q)
-        J[k] = kinematics.jacobian(frame)[rows]
+        J[k] = kinematics.task_jacobian(rows)
     target_rotations, target_translations = _targets(trace, scenario)
+    position, orientation = _errors(scenario, X, target_rotations, target_translations)
     return Motion(
         trace=trace,
         scenario=scenario,
         translations=X[:, :3, 3],
-        position_error=(
-            np.linalg.norm(X[:, :3, 3] - target_translations, axis=1)
-            if rows[0] < 3
-            else np.full(n + 1, np.nan)
-        ),
-        orientation_error=(
-            rotation_angles(X[:, :3, :3], target_rotations)
-            if rows[-1] >= 3
-            else np.full(n + 1, np.nan)
-        ),
+        position_error=position,
+        orientation_error=orientation,
         jacobians=J,
         points=scenario.embedding.points(X[:, :3, :3], X[:, :3, 3]),
         target_points=scenario.embedding.points(target_rotations, target_translations),
     )
+
+
+def _errors(
+    scenario: Scenario, X: Array, target_rotations: Array, target_translations: Array
+) -> tuple[Array, Array]:
+    """Compute the errors of position [m] and orientation [rad] at each instant, (n + 1,) each.
+
+    Where some rows of either are asked for only (of an arm that could move the others), they are
+    the lengths of these rows of the error; NaN where none is.
+    """
+    robot, rows = scenario.robot, scenario.rows
+    linear, angular = [row for row in rows if row < 3], [row - 3 for row in rows if row >= 3]
+    nothing = np.full(len(X), np.nan)
+    position, orientation = nothing, nothing
+    R, away = X[:, :3, :3], target_translations - X[:, :3, 3]
+    in_space = 2 in robot.movable_rows
+    if linear:
+        if len(linear) < 3 and in_space and robot.task_axes == "body":
+            away = np.einsum("kji,kj->ki", R, away)
+        kept = linear if len(linear) < 3 and in_space else slice(None)
+        position = np.linalg.norm(away[:, kept], axis=1)
+    if angular and (len(angular) == 3 or not in_space):
+        orientation = rotation_angles(R, target_rotations)
+    elif angular:
+        turns = [
+            orientation_error(robot, each.T @ wanted, each, angular)
+            for each, wanted in zip(R, target_rotations, strict=True)
+        ]
+        orientation = np.linalg.norm(turns, axis=1)
+    return position, orientation
 
 
 def _check_sizes(trace: Trace, scenario: Scenario) -> None:

@@ -6,6 +6,7 @@ import os.path
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
+from math import isfinite
 from pathlib import Path
 from typing import Any, Final
 
@@ -117,16 +118,15 @@ def limit_numbers(value: LimitNumbers, kind: str) -> float | list[float]:
     Raises:
         DikbenchError: if it is neither.
     """
-    if not isinstance(value, str):
-        return value  # type: ignore[return-value]
+    parts = value.split() if isinstance(value, str) else np.ravel(value)
     try:
-        numbers = [float(part) for part in value.split()]
-    except ValueError:
+        numbers = [float(part) for part in parts]
+    except (TypeError, ValueError):
         numbers = []
-    if not numbers:
+    if not numbers or not all(number > 0 for number in numbers):
         raise DikbenchError(
-            f"{kind}={value!r} is not valid; valid: a number for all joints, or one for each, "
-            "separated by spaces"
+            f"{kind}={value!r} is not valid; valid: a number above 0 for all joints, or one for "
+            "each, separated by spaces"
         )
     return numbers[0] if len(numbers) == 1 else numbers
 
@@ -187,11 +187,13 @@ def _positions(robot: Robot, lock: Locked | None) -> dict[str, float | None]:
     for item in lock.split() if isinstance(lock, str) else lock or ():
         name, equals, value = str(item).partition("=")
         try:
+            if name in found or (equals and not isfinite(float(value))):
+                raise ValueError
             found[name] = float(value) if equals else None
         except ValueError:
             raise DikbenchError(
-                f"lock={item!r} is not valid; valid: names of joints of robot {robot.name}, or "
-                "joint=position"
+                f"lock={item!r} is not valid; valid: names of joints of robot {robot.name}, each "
+                "once, or joint=position"
             ) from None
     return found
 

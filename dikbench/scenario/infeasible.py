@@ -148,6 +148,8 @@ def _branch_leads_out(scenario: Scenario, last: float) -> str:
     chain, rows = robot.chain, scenario.rows
     if motion is None or len(chain) != len(rows) or motion.margin[0] < 0:
         return ""
+    if scenario.embedding.of_one_turn:  # whose points are not linear in the rotation
+        return ""
     kinematics, worst = Kinematics(robot), (1.0, "", 0)
     unit = FIRST_ORDER_FACTOR * scenario.tolerance_m
     for k in range(int(np.searchsorted(motion.instants, last, side="right"))):

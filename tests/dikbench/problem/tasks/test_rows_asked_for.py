@@ -8,10 +8,13 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from makers.scenarios import run_of
 from makers.urdfs import SIX, write_arm
 
 import dikbench
 from dikbench.errors import DikbenchError
+from dikbench.metrics import motion_of
+from dikbench.plugins.building import make_scenario
 from dikbench.problem import Array, Kinematics, OrientationTask, PoseTask, PositionTask, Robot
 from dikbench.problem.embedding import embedding_of
 from dikbench.problem.progress import CHARACTERISTIC_LENGTH_M
@@ -156,3 +159,30 @@ def test_rows_that_are_none(rows: str, tmp_path: Path) -> None:
     """The message says how they are written."""
     with pytest.raises(DikbenchError, match=r"rows=.* is not valid; valid: x, y, z, rx, ry, rz"):
         arm(tmp_path, rows)
+
+
+@pytest.mark.parametrize("rows", ["world:xyrz", "world:xy", "xyzrxry"])
+def test_metrics_are_of_the_rows_that_are_asked_for(rows: str, tmp_path: Path) -> None:
+    """Computed again from the trace they are the same; what drifts freely is no error."""
+    path = write_arm(tmp_path, SIX)
+    scenario = make_scenario(f"reach[robot={path},frame=tool,rows={rows},distance=0.05]")
+    run = run_of("pinv", scenario)
+    known = motion_of(run.trace, scenario, run.jacobians)
+    again = motion_of(run.trace, scenario)
+    np.testing.assert_array_equal(known.jacobians, again.jacobians)
+    assert known.position_error[-1] < 1e-3
+    if scenario.rows[-1] >= 3:
+        assert known.orientation_error[-1] < 5e-3
+        kinematics = Kinematics(scenario.robot)
+        kinematics.update(run.trace.q[-1])
+        R = kinematics.placement(scenario.robot.frame_id).rotation
+        wanted = scenario.reference.placement(scenario.duration).rotation
+        assert np.linalg.norm(pin.log3(R.T @ wanted)) > 0.02
+
+
+@pytest.mark.parametrize("by_hand", ["velocity=0", "acceleration=0", "velocity=-1", "velocity=nan"])
+def test_limits_by_hand_are_above_zero(by_hand: str, tmp_path: Path) -> None:
+    """One line, before anything is divided by them."""
+    path = write_arm(tmp_path, SIX)
+    with pytest.raises(DikbenchError, match="is not valid; valid: a number above 0"):
+        make_scenario(f"reach[robot={path},frame=tool,{by_hand}]")
