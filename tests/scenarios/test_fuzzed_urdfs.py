@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -89,35 +90,26 @@ def one_arm(
     return True
 
 
-arms = st.lists(joints, min_size=1, max_size=8)
-grippers = st.lists(joints, max_size=2)
+CASES: dict[str, Any] = {
+    "arm": st.lists(joints, min_size=1, max_size=8),
+    "gripper": st.lists(joints, max_size=2),
+    "chosen": options,
+    "family": st.sampled_from(FAMILIES),
+    "seed": st.integers(0, 3),
+}
 suppressed = [HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=suppressed)
-@given(arms, grippers, options, st.sampled_from(FAMILIES), st.integers(0, 3))
-def test_any_arm_makes_a_scenario_or_one_line(
-    tmp_path: Path,
-    arm: list[Joint],
-    gripper: list[Joint],
-    chosen: dict[str, str],
-    family: str,
-    seed: int,
-) -> None:
+@settings(max_examples=1500, deadline=None, suppress_health_check=suppressed)
+@given(**CASES)
+def test_any_arm_makes_a_scenario_or_one_line(tmp_path: Path, **case: Any) -> None:
     """Whose start is inside the limits of all joints, at every seed."""
-    one_arm(tmp_path, arm, gripper, chosen, family, seed)
+    one_arm(tmp_path, **case)
 
 
 @pytest.mark.long
 @settings(max_examples=20_000, deadline=None, suppress_health_check=suppressed)
-@given(arms, grippers, options, st.sampled_from(FAMILIES), st.integers(0, 3))
-def test_many_arms(
-    tmp_path: Path,
-    arm: list[Joint],
-    gripper: list[Joint],
-    chosen: dict[str, str],
-    family: str,
-    seed: int,
-) -> None:
+@given(**CASES)
+def test_many_arms(tmp_path: Path, **case: Any) -> None:
     """The same, of more."""
-    one_arm(tmp_path, arm, gripper, chosen, family, seed)
+    one_arm(tmp_path, **case)
