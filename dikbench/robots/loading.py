@@ -181,9 +181,9 @@ def _from_urdf(path: str, frame: str | None, root: Root) -> Robot:
 
 def _positions(robot: Robot, lock: Locked | None) -> dict[str, float | None]:
     """Read which joints are locked, and where if that is given."""
-    if isinstance(lock, Mapping):
-        return dict(lock)
     found: dict[str, float | None] = {}
+    if isinstance(lock, Mapping):
+        lock = [f"{name}={value}" for name, value in lock.items()]
     for item in lock.split() if isinstance(lock, str) else lock or ():
         name, equals, value = str(item).partition("=")
         try:

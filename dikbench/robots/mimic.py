@@ -89,10 +89,9 @@ def write_followers(
             element.remove(old)
     for joint in joints:
         element, other = elements[joint.name], elements[str(joint.other)]
-        if element.get("type") != "prismatic" and other.get("type") != "prismatic":
-            element.set(
-                "type", str(other.get("type"))
-            )  # the same coordinates, an angle or (cos, sin)
+        if "prismatic" not in (element.get("type"), other.get("type")):
+            # Both have an angle as coordinate, or (cos, sin).
+            element.set("type", str(other.get("type")))
         law = {"multiplier": repr(joint.multiplier), "offset": repr(joint.offset)}
         ElementTree.SubElement(element, "mimic", {"joint": str(joint.other), **law})
 

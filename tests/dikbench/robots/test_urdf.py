@@ -338,6 +338,16 @@ def test_a_follower_is_locked_by_the_joint_that_it_follows(tmp_path: Path) -> No
         load_robot(path, "tool").with_limits(effort=True)
 
 
+@pytest.mark.parametrize("lock", ["j1=nan", "j1=inf", "j1 j1=0.5", {"j1": float("nan")}])
+def test_positions_of_locked_joints_are_numbers_given_once(
+    lock: str | dict[str, float], tmp_path: Path
+) -> None:
+    """Also of a joint without limits, in a text or in a mapping."""
+    path = write_arm(tmp_path, (Joint(kind="continuous"), *SIX[1:]))
+    with pytest.raises(DikbenchError, match="is not valid; valid: names of joints"):
+        load_robot(path, "tool", lock=lock)
+
+
 def test_rows_that_depend_on_each_other_are_refused() -> None:
     """Three turns and two lines are too much for the wrist of these five joints."""
     at = f"robot={DATA / 'five_dof.urdf'},frame=tool"

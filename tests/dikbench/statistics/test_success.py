@@ -80,6 +80,28 @@ def test_a_trial_that_did_not_run_counts_where_its_scenario_does() -> None:
     assert found.whole.all()
 
 
+def test_who_does_not_see_what_is_limited_did_not_succeed() -> None:
+    """It was skipped there, which is no way to a better rate; other skips do not count."""
+    blind = {"status": "skipped", "sees_constraints": 0.0}
+    rows = pd.DataFrame(
+        [
+            trial("obstacle.r.x", "sees"),
+            trial("obstacle.r.x", "blind", "does-not-see", **blind),
+            trial("obstacle.r.x", "refused", "", status="skipped"),
+            trial("reach.r.x", "sees", "late"),
+            trial("reach.r.x", "blind"),
+            trial("reach.r.x", "refused"),
+        ]
+    )
+    part = counted(with_facts(rows), "time")
+    found = rates(part, succeeded(part))
+    of = dict(
+        zip(found.contenders["formulation"], zip(found.rate, found.whole, strict=True), strict=True)
+    )
+    assert of["blind"] == (0.5, True)
+    assert of["refused"] == (1.0, False)
+
+
 def _many(rate_b: int, scenarios: int = 60) -> pd.DataFrame:
     names = [f"f{k % 6}.r.{k}" for k in range(scenarios)]
     outcomes = ["success" if k % 10 < rate_b else "late" for k in range(scenarios)]

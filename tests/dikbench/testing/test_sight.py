@@ -137,6 +137,7 @@ def test_constraints_that_are_not_looked_at_are_refused() -> None:
     row = run_trial(Trial.of("dls", "torque-limited[robot=ur5]", "none"))
     assert (row["status"], row["steps"], row["sees_constraints"]) == ("skipped", 0, False)
     assert "does not look at constraints" in row["message"]
+    assert row["outcome"] == row["decided_before"] == "does-not-see"
 
 
 def test_no_formulation_is_blamed_for_a_target_that_is_none(
