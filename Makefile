@@ -13,6 +13,9 @@ test:            ## the tests
 test-long:       ## the tests that take minutes
 	$(PYTHON) -m pytest -m long
 
+test-random:     ## the tests with other examples of their properties at every run
+	$(PYTHON) -m pytest --hypothesis-profile random
+
 lint:            ## style, format and types
 	$(PYTHON) -m ruff check . && $(PYTHON) -m ruff format --check . && $(PYTHON) -m mypy
 
@@ -44,4 +47,4 @@ benchmark-laws:  ## what the laws without a solver cost, as ratios to dls
 constraints:     ## the installed versions become the tested ones
 	.venv/bin/pip freeze --exclude-editable --exclude pip --exclude setuptools > constraints.txt
 
-.PHONY: help setup test test-long lint format contract quick benchmark benchmark-scenarios benchmark-solvers benchmark-laws mutation constraints
+.PHONY: help setup test test-long test-random lint format contract quick benchmark benchmark-scenarios benchmark-solvers benchmark-laws mutation constraints

@@ -44,8 +44,9 @@ def _sampled(path: Callable[[float], Any], period: float, duration: float = 2.0)
 
 
 def _velocity(path: Callable[[float], Any], tau: float, h: float = 1e-5) -> Array:
-    """The body twist by central differences of placements."""
-    V: Array = pin.log6(path(tau - h).actInv(path(tau + h))).np / (2 * h)
+    """The body twist by central differences of placements, of the fourth order in h."""
+    once, twice = (pin.log6(path(tau - d).actInv(path(tau + d))).np / (2 * d) for d in (h, 2 * h))
+    V: Array = (4 * once - twice) / 3
     return V
 
 
@@ -83,7 +84,7 @@ def test_velocity_is_the_derivative_of_the_placement(
         tau = here + share * (there - here)
         twist = _velocity(reference.placement, tau, 1e-4 * (there - here))
         scale = 1.0 + float(np.abs(twist).max())
-        assert reference.velocity(tau) / scale == pytest.approx(twist / scale, abs=1e-5)
+        assert reference.velocity(tau) / scale == pytest.approx(twist / scale, abs=1e-7)
 
 
 @given(twists, gaps)
