@@ -127,7 +127,7 @@ def _off_path(motion: Motion) -> Verdict:
 
 def _chatter(motion: Motion) -> Verdict | None:
     """What is decided after any tolerance."""
-    mask = chattering(motion)
+    mask = motion.series(chattering)
     count = int(np.count_nonzero(mask))
     if count < CHATTER_STEPS or count <= CHATTER_SHARE * len(mask):
         return None

@@ -48,8 +48,7 @@ def course(motion: Motion) -> float:
     if not moving.any():
         return NAN
     steps = np.diff(motion.points, axis=0)[moving]
-    _, nearest, shares = motion.nearest_on_path
-    tangents = path.tangents(nearest, shares)
+    tangents = motion.tangents
     before, after = tangents[:-1][moving], tangents[1:][moving]
     turned_back = np.einsum("ij,ij->i", before, after) < 0
     tangents = before + np.where(turned_back, -1.0, 1.0)[:, None] * after
