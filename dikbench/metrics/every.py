@@ -10,7 +10,7 @@ from dikbench.metrics.contour import CONTOUR
 from dikbench.metrics.distance_and_torque import CONSTRAINTS
 from dikbench.metrics.freeze import FREEZE
 from dikbench.metrics.metric import Metric
-from dikbench.metrics.motion import Motion
+from dikbench.metrics.motion import Motion, is_finite
 from dikbench.metrics.null_space_drift import NULL_SPACE_DRIFT
 from dikbench.metrics.path_following import PATH_FOLLOWING
 from dikbench.metrics.smoothness import SMOOTHNESS
@@ -34,6 +34,6 @@ def evaluate(motion: Motion) -> dict[str, float]:
 
     For a motion that is not finite each metric has its worst value.
     """
-    if not motion.is_finite:
+    if motion.whole is None and not is_finite(motion.trace):
         return {name: metric.worst for name, metric in METRICS.items()}
     return {name: metric.of(motion) for name, metric in METRICS.items()}

@@ -27,6 +27,12 @@ BLUR: Final = 1e-6
 """How much rounding may change a small singular value (m, rad) when its matrix is squared."""
 
 
+def is_finite(trace: Trace) -> bool:
+    """Whether every number of a trace that motions are made of is finite."""
+    recorded = (trace.q, trace.tau, trace.wanted, trace.applied)
+    return all(bool(np.isfinite(part).all()) for part in recorded)
+
+
 def _by_rows(values: Callable[[Motion], Array]) -> cached_property[Array]:
     """Make a series of values that each follow from a step, or an instant and the step to it.
 
@@ -76,13 +82,6 @@ class Motion:
     target_points: Array
     whole: Motion | None = None
     first: int = 0
-
-    @cached_property
-    def is_finite(self) -> bool:
-        """Whether every number of its trace that metrics are made of is finite."""
-        trace = self.trace
-        recorded = (trace.q, trace.tau, trace.wanted, trace.applied)
-        return all(bool(np.isfinite(part).all()) for part in recorded)
 
     def series(self, values: Callable[[Motion], Array | Mask]) -> Array | Mask:
         """Compute a series of the motion, on first use."""
