@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from dikbench.arrays import Array, Indices, Mask
+from dikbench.arrays import Array, Mask
 from dikbench.metrics.metric import series_metrics
 from dikbench.metrics.motion import Motion
 from dikbench.robots.robot import Robot
@@ -71,30 +71,25 @@ def _shaking(motion: Motion) -> Mask:
         return mask
     number = 2 * SHAKING_PERIODS
     longest = SHAKING_PERIODS / (SHAKING_FREQUENCY_HZ * motion.trace.dt) * (1 + RELATIVE_ROUNDING)
-    places = _extrema(motion.velocities)
-    for joint, extrema in enumerate(places):
-        # Reversals are extrema: where these are too far apart, so are they.
-        if len(extrema) <= number or (extrema[number:] - extrema[:-number]).min() > longest:
+    jumps = motion.jumps
+    # Every extremum is at one of these, and every reversal at an extremum.
+    places, joints = np.nonzero(jumps[1:] * jumps[:-1] <= 0)
+    for joint in range(jumps.shape[1]) if len(places) > number else ():
+        near = places[joints == joint]
+        if len(near) <= number or (near[number:] - near[:-number]).min() > longest:
             continue
-        least = SHAKING_AMPLITUDE * limit.upper[joint]
-        turned = _reversals(motion.velocities[:, joint], extrema, least)
+        turned = _reversals(motion.velocities[:, joint], SHAKING_AMPLITUDE * limit.upper[joint])
         for start, end in zip(turned, turned[number:], strict=False):
             if end - start <= longest:
                 mask[max(start - 1, 0) : end] = True
     return mask
 
 
-def _extrema(values: Array) -> list[Indices]:
-    """Find where each column of values (n + 1, nv) turns from rising to falling or back."""
-    slopes = np.sign(np.diff(values.T, axis=1))
-    column, place = np.nonzero(slopes)
-    moving = slopes[column, place]
-    turns = np.flatnonzero((moving[1:] != moving[:-1]) & (column[1:] == column[:-1])) + 1
-    return np.split(place[turns], np.searchsorted(column[turns], np.arange(1, len(slopes))))
-
-
-def _reversals(values: Array, extrema: Indices, least: float) -> list[int]:
-    """Choose the extrema before and after which values (n + 1,) change by more than `least`."""
+def _reversals(values: Array, least: float) -> list[int]:
+    """Find the extrema before and after which values (n,) change by more than `least`, in order."""
+    slopes = np.sign(np.diff(values))
+    moving = np.flatnonzero(slopes)
+    extrema = moving[1:][slopes[moving[1:]] != slopes[moving[:-1]]]
     found: list[int] = []
     high = low = direction = 0
     for place in (*extrema.tolist(), len(values) - 1):

@@ -135,6 +135,11 @@ class Motion:
         """Change of the joint velocity into each step, (n, nv) [rad/s]."""
         return np.diff(self.velocities, axis=0)
 
+    @cached_property
+    def acceleration_changes(self) -> Array:
+        """Change of the acceleration from each step to the next, (n - 1, nv) [rad/s^2]."""
+        return np.diff(self.accelerations, axis=0)
+
     @_by_rows
     def position_excess(self) -> Array:
         """Largest distance of a joint outside its position limits, (n + 1,) [rad or m].
@@ -211,11 +216,22 @@ class Motion:
         return path.nearest(self.points)
 
     @_by_rows
-    def tangents(self) -> Array:
-        """Unit tangents of the path at its points that are nearest, (n + 1, d)."""
+    def along_and_across(self) -> Array:
+        """Length of each step of x along the tangent of the path and across it, (n, 2) [m].
+
+        The tangent is the mean of those where it is nearest to the step's beginning and its end.
+        """
         path = self.scenario.embedded_path
         assert path is not None
-        return path.tangents(*self.nearest_on_path[1:])
+        steps, tangents = np.diff(self.points, axis=0), path.tangents(*self.nearest_on_path[1:])
+        before, after = tangents[:-1], tangents[1:]
+        turned_back = np.einsum("ij,ij->i", before, after) < 0
+        means = before + np.where(turned_back, -1.0, 1.0)[:, None] * after
+        sizes = np.linalg.norm(means, axis=1, keepdims=True)
+        means /= np.where(sizes > 0, sizes, 1.0)
+        along = np.einsum("ij,ij->i", steps, means)
+        across = np.linalg.norm(steps - along[:, None] * means, axis=1)
+        return np.stack([along, across], axis=1)
 
     @cached_property
     def along_path(self) -> AlongPath | None:

@@ -72,6 +72,11 @@ class EmbeddedPath:
         squares: Array = np.einsum("ij,ij->i", self.pieces, self.pieces)
         return squares
 
+    @cached_property
+    def extent(self) -> float:
+        """Largest distance of a sample from the first one [m]."""
+        return float(np.linalg.norm(self.points - self.points[0], axis=1).max())
+
     def last_until(self, times: Any) -> Any:
         """Find the last sample whose nominal time is not after these [s]: its number."""
         return np.searchsorted(self.times, np.asarray(times) + SAME_INSTANT_S, side="right") - 1

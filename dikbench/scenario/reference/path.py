@@ -27,6 +27,9 @@ NEGLIGIBLE_LENGTH_M: Final = 1e-9
 FIRST_NEIGHBOUR_COUNT: Final = 3
 """Number of nearest vertices that are searched first."""
 
+POINTS_TOGETHER: Final = 128
+"""Feet of so many points are computed at once: the arrays of more do not stay in the cache."""
+
 
 @dataclass(frozen=True, eq=False)
 class ReferencePath:
@@ -120,16 +123,20 @@ def feet(
     Returns:
         Two arrays (n, k): 0 at the piece's start to 1 at its end, and [m^2].
     """
-    asked = pieces.ravel()
-    away, along = np.repeat(points, pieces.shape[1], axis=0), ways.take(asked, axis=0)
-    away -= starts.take(asked, axis=0)
-    share = np.einsum("ij,ij->i", away, along)
-    share /= np.maximum(squares.take(asked), np.finfo(float).tiny)
-    np.minimum(np.maximum(share, 0.0, out=share), 1.0, out=share)
-    along *= share[:, None]
-    away -= along
-    found = np.einsum("ij,ij->i", away, away)
-    return share.reshape(pieces.shape), found.reshape(pieces.shape)
+    shares, found = np.empty(pieces.shape), np.empty(pieces.shape)
+    for first in range(0, len(points), POINTS_TOGETHER):
+        part = slice(first, first + POINTS_TOGETHER)
+        asked = pieces[part].ravel()
+        away, along = np.repeat(points[part], pieces.shape[1], axis=0), ways.take(asked, axis=0)
+        away -= starts.take(asked, axis=0)
+        share = np.einsum("ij,ij->i", away, along)
+        share /= np.maximum(squares.take(asked), np.finfo(float).tiny)
+        np.minimum(np.maximum(share, 0.0, out=share), 1.0, out=share)
+        along *= share[:, None]
+        away -= along
+        shares[part] = share.reshape(-1, pieces.shape[1])
+        found[part] = np.einsum("ij,ij->i", away, away).reshape(-1, pieces.shape[1])
+    return shares, found
 
 
 def reference_path(reference: Reference, dt: float) -> ReferencePath:
