@@ -50,8 +50,8 @@ def judge(motion: Motion, status: Status) -> Judgement:
     if along is None:
         return decided
     done_99, done_90, in_time = along.tolerances
-    tolerances = {"done_99": done_99, "done_90": done_90, "in_time": in_time}
-    return replace(decided, **tolerances, extent=along.path.extent)
+    extent = along.path.extent
+    return replace(decided, done_99=done_99, done_90=done_90, in_time=in_time, extent=extent)
 
 
 def _holds(motion: Motion) -> bool:
