@@ -177,6 +177,7 @@ def test_all_who_shake_are_found(seed: int) -> None:
     """Against every reversal of every joint: of noise, waves and rests of any size and pace."""
     random = np.random.default_rng(seed)
     scenario = scenario_of("speed-sweep[laps=1]")
+    assert scenario.robot.limits.velocity is not None
     most, n = scenario.robot.limits.velocity.upper, int(random.integers(1, 120))
     waves = np.sin(np.arange(n)[:, None] * random.uniform(0, 2, 7) + random.uniform(0, 6, 7))
     v = most * random.choice([0, 1e-3, 0.006, 0.02, 0.2], (n, 7)) * waves
