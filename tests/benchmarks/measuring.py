@@ -2,9 +2,9 @@
 
     python tests/benchmarks/measuring.py
 
-Prints microseconds of CPU per step, the median over interleaved rounds on one core and one thread, and
-their ratio to the kinematics of a step (Jacobians and placement of the task frame by Pinocchio) and
-to a tick of Pink, where it is installed, in the same rounds.
+Prints microseconds of CPU per step, the median over interleaved rounds on one core and one thread,
+and their ratio to the kinematics of a step (Jacobians and placement of the task frame by Pinocchio)
+and to a tick of Pink, where it is installed, in the same rounds.
 """
 
 from __future__ import annotations
