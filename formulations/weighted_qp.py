@@ -55,6 +55,11 @@ class WeightedQp(Parameters):
     )
     sees: ClassVar[frozenset[ProblemPart]] = frozenset({"lower-tasks"})
 
+    @property
+    def batched(self) -> bool:
+        """Without the derivative of the logarithm, which is computed for one placement."""
+        return not self.log_derivative
+
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
         first, *others = problem.tasks

@@ -9,7 +9,7 @@ from typing import Final, Literal, Protocol, runtime_checkable
 
 import msgspec
 
-from dikbench.arrays import Array
+from dikbench.arrays import Array, Indices
 from dikbench.problem.tasks.task import LinearizedJointTask, LinearizedTask, stacked
 from dikbench.problem.velocity_box import Box, Braking, velocity_box
 from dikbench.programs.modelled_program import ModelledProgram
@@ -28,6 +28,10 @@ _PRIORITY: Final = attrgetter("priority")
 
 class DikProblem(msgspec.Struct, eq=False):
     """One control step: the configuration, the tasks, the limits.
+
+    A formulation that is `batched` (see `Formulation`) is handed N control steps of one robot at
+    once: q, v_prev, the coordinates of the limits, and J, V and the error of each task have an axis
+    of rows in front, (N, nq), (N, m, nv) ...; a posture task's J is the same for all, (nv, nv).
 
     The tasks may be given in any order: they are sorted by priority when the problem is made, and
     those of one priority keep the order in which they were given.
@@ -50,7 +54,7 @@ class DikProblem(msgspec.Struct, eq=False):
     dt: float
     tasks: Sequence[LinearizedTask]
     limits: Limits
-    relaxed: int = 0
+    relaxed: int | Indices = 0
     G: Array | None = None
     h: Array | None = None
     _levels: tuple[LinearizedTask, ...] | None = None
@@ -61,7 +65,8 @@ class DikProblem(msgspec.Struct, eq=False):
         Raises:
             DikbenchError: if a (cos, sin) or a quaternion in q has not norm 1.
         """
-        self.robot.check_norms(self.q, "q")
+        if self.q.ndim == 1:
+            self.robot.check_norms(self.q, "q")
         self.tasks = self._levels = tasks = tuple(self.tasks)
         for first, second in pairwise(tasks):
             if first.priority >= second.priority:
@@ -111,6 +116,11 @@ class Formulation(Protocol):
     none but what it keeps). A method `refuses(problem)` says why it cannot answer problems of this
     kind, and returns an empty text where it can. A paragraph `Source: ...` in its docstring names
     the paper. The same problem gives the same velocity.
+
+    With `batched = True` it says that `velocity` also answers N control steps at once (see
+    `DikProblem`), (N, nv), each as if it were alone: matrices with the functions of
+    `dikbench.problem`, everything else element by element or over the last axis. NaN in a row
+    stands for an answer that it has to be asked for alone.
     """
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
@@ -131,6 +141,11 @@ def program_of(formulation: Formulation) -> ProgramKind | None:
 def promises_of(formulation: Formulation) -> frozenset[LimitKind]:
     """Return the kinds of limits that the formulation promises to keep."""
     return frozenset(getattr(formulation, "keeps", ()))
+
+
+def is_batched(formulation: Formulation) -> bool:
+    """Return whether the formulation answers many control steps at once."""
+    return bool(getattr(formulation, "batched", False))
 
 
 def sight_of(formulation: Formulation) -> frozenset[ProblemPart]:

@@ -147,7 +147,7 @@ def solve_dik(
         status = Status.NOT_VERIFIED
     if status is Status.OK and alpha < STUCK_PROGRESS:
         status = Status.STUCK
-    return DikAnswer(v, alpha, status, problem.relaxed)
+    return DikAnswer(v, alpha, status, int(problem.relaxed))
 
 
 def _solve_for(formulation: Formulation, selector: str | None) -> CheckedSolve:
