@@ -167,7 +167,7 @@ def _least_norm_of_many(A: Array, b: Array, tolerance: float) -> Array:
     # A singular value is at least sqrt(WELL_CONDITIONED trace) there.
     sure &= trace * WELL_CONDITIONED > tolerance**2
     x = np.empty((len(A), A.shape[2]))
-    x[sure] = _by_gram(A[sure], b[sure], gram[sure], wide=wide)
+    x[sure] = _refined(A[sure], b[sure], gram[sure], wide=wide)
     x[~sure] = by_singular_values(
         A[~sure], b[~sure], lambda sigma, parts: divided(parts, sigma, ~(sigma <= tolerance))
     )
@@ -237,6 +237,20 @@ def _by_gram(A: Array, b: Array, gram: Array, *, wide: bool) -> Array:
         x: Array = np.vecmat(y, A)
         return x
     x = np.linalg.solve(gram, np.vecmat(b, A)[..., None])[..., 0]
+    return x
+
+
+def _refined(A: Array, b: Array, gram: Array, *, wide: bool) -> Array:
+    """Compute A^T gram^-1 b, or gram^-1 A^T b, and once more for what is left of b, (N, n).
+
+    It has then as many digits as the singular values give.
+    """
+    inverse: Any = np.linalg.inv(gram)
+    At = A.transpose(0, 2, 1)
+    x = np.zeros((len(A), A.shape[2]))
+    for _ in range(2):
+        left = b - times(A, x)
+        x = x + (times(At, times(inverse, left)) if wide else times(inverse, times(At, left)))
     return x
 
 

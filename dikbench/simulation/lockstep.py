@@ -168,6 +168,7 @@ class _Lockstep:
             np.array([getattr(scenario.tasks[n], "target", ()) for scenario in scenarios])
             for n in range(len(first.tasks))
         ]
+        self.all_q[:, 0], self.all_tau[:, 0] = self.q, self.clock.tau()
         self._drop(self.clock.over())
 
     def step(self) -> None:
@@ -221,7 +222,6 @@ class _Lockstep:
         if not len(running):
             return
         applied = self.plant.apply(v, limits)
-        self.all_q[running, k], self.all_tau[running, k] = self.q, self.clock.tau()
         self.desired[running, k], self.jacobians[running, k] = tracked_V, tracked_J
         self.commanded[running, k], self.applied[running, k] = v, applied
         self.status[running, k], self.relaxed[running, k] = status, relaxed
@@ -266,10 +266,7 @@ class _Lockstep:
         for task, postures in zip(self.scenarios[0].tasks, self.postures, strict=True):
             tasks.append(linearize_task(task, self.robot, seen, postures))
         limits = Limits(self.robot.limits, _coordinates(self.robot.limits, seen))
-        problem = DikProblem(self.robot, seen, self.v_prev, self.dt, tasks, limits)
-        for part in (seen, self.v_prev, *(x for t in tasks for x in (t.J, t.V, t.error))):
-            part.setflags(write=False)
-        return problem
+        return _read_only(DikProblem(self.robot, seen, self.v_prev, self.dt, tasks, limits))
 
     def _place_of_tracking(self, problem: DikProblem) -> int:
         """Return where the tracking task is among the tasks, which are sorted by priority."""
@@ -388,7 +385,19 @@ def _rows(problem: DikProblem, rows: list[int]) -> DikProblem:
     coordinates, v_prev = problem.limits.coordinates, problem.v_prev
     limits = Limits(problem.limits.joint, None if coordinates is None else coordinates[rows])
     before = None if v_prev is None else v_prev[rows]
-    return DikProblem(problem.robot, problem.q[rows], before, problem.dt, tasks, limits)
+    return _read_only(DikProblem(problem.robot, problem.q[rows], before, problem.dt, tasks, limits))
+
+
+def _read_only(problem: DikProblem) -> DikProblem:
+    """Forbid writing to what a formulation is handed."""
+    for part in (
+        problem.q,
+        problem.v_prev,
+        *(x for t in problem.tasks for x in (t.J, t.V, t.error)),
+    ):
+        if part is not None:
+            part.setflags(write=False)
+    return problem
 
 
 def _copy(source: RecheckedSteps, row: int, target: RecheckedSteps, step: int) -> None:
