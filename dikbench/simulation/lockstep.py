@@ -196,8 +196,8 @@ class _Lockstep:
                 if far[row]:
                     raise TrialEnded(Status.DIVERGED, f"task error above {DIVERGED_ERROR:g} m, rad")
                 own = self._row(problem, targets, row)
-                answer = control_step(self.formulation, own, self.solves[trial], k)
                 self.alone[trial] += 1
+                answer = control_step(self.formulation, own, self.solves[trial], k)
                 v[row], status[row] = answer.velocity, STEP_CODE[answer.status]
                 relaxed[row] = own.relaxed
             except TrialEnded as ended:

@@ -193,8 +193,7 @@ def test_a_row_that_goes_wrong_costs_the_others_nothing(how: str) -> None:
     others = _together([scenarios[0], scenarios[2]], formulation, seeds=[0, 2])
     for row, k in enumerate((0, 2)):
         assert np.array_equal(others[row].run.trace.q, found[k].run.trace.q)
-    ends = {"infeasible", "failed"}
-    assert (found[1].run.status is Status.OK) == (how in ends)
+    assert (found[1].run.status is Status.OK) == (how in {"infeasible", "failed"})
 
 
 def test_a_formulation_that_writes_to_its_rows_is_asked_alone() -> None:
