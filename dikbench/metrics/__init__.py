@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dikbench.metrics.every import METRICS, evaluate
 from dikbench.metrics.judging import judge, outcome_columns
+from dikbench.metrics.measuring import Measured, measure
 from dikbench.metrics.metric import Metric, series_metrics
 from dikbench.metrics.motion import Motion
 from dikbench.metrics.motion_of_trace import motion_of
@@ -30,12 +31,14 @@ __all__ = [
     "REDUCTIONS",
     "VIOLATION_TOLERANCE",
     "Judgement",
+    "Measured",
     "Metric",
     "Motion",
     "Outcome",
     "Verdict",
     "evaluate",
     "judge",
+    "measure",
     "motion_of",
     "outcome_columns",
     "series_metrics",

@@ -44,10 +44,10 @@ def _jumping(motion: Motion) -> Mask:
     but smaller changes between, both times by more than a dt, with a its acceleration limit where
     one is known, otherwise its speed limit over 0.1 s.
     """
-    jumps = np.diff(motion.velocities, axis=0)
+    jumps = motion.jumps
     large = np.abs(jumps) > largest_acceleration(motion.scenario.robot) * motion.trace.dt
-    if not len(jumps):
-        return np.zeros(0, dtype=bool)
+    if not large.any():
+        return np.zeros(len(jumps), dtype=bool)
     signs = np.where(large, np.sign(jumps), 0.0)
     steps = np.arange(len(jumps))[:, None]
     # The last jump before each step, by its number; -1 where there was none.
@@ -71,8 +71,14 @@ def _shaking(motion: Motion) -> Mask:
         return mask
     number = 2 * SHAKING_PERIODS
     longest = SHAKING_PERIODS / (SHAKING_FREQUENCY_HZ * motion.trace.dt) * (1 + RELATIVE_ROUNDING)
-    for velocity, largest in zip(motion.velocities.T, limit.upper, strict=True):
-        turned = _reversals(velocity, SHAKING_AMPLITUDE * largest)
+    jumps = motion.jumps
+    # Every extremum is at one of these, and every reversal at an extremum.
+    places, joints = np.nonzero(jumps[1:] * jumps[:-1] <= 0)
+    for joint in range(jumps.shape[1]) if len(places) > number else ():
+        near = places[joints == joint]
+        if len(near) <= number or (near[number:] - near[:-number]).min() > longest:
+            continue
+        turned = _reversals(motion.velocities[:, joint], SHAKING_AMPLITUDE * limit.upper[joint])
         for start, end in zip(turned, turned[number:], strict=False):
             if end - start <= longest:
                 mask[max(start - 1, 0) : end] = True

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-import numpy as np
-
 from dikbench.metrics.chatter import CHATTER
 from dikbench.metrics.contour import CONTOUR
 from dikbench.metrics.distance_and_torque import CONSTRAINTS
 from dikbench.metrics.freeze import FREEZE
 from dikbench.metrics.metric import Metric
-from dikbench.metrics.motion import Motion
+from dikbench.metrics.motion import Motion, is_finite
 from dikbench.metrics.null_space_drift import NULL_SPACE_DRIFT
 from dikbench.metrics.path_following import PATH_FOLLOWING
 from dikbench.metrics.smoothness import SMOOTHNESS
@@ -36,8 +34,6 @@ def evaluate(motion: Motion) -> dict[str, float]:
 
     For a motion that is not finite each metric has its worst value.
     """
-    trace = motion.trace
-    recorded = (trace.q, trace.tau, trace.wanted, trace.applied)
-    if not all(np.isfinite(part).all() for part in recorded):
+    if motion.whole is None and not is_finite(motion.trace):
         return {name: metric.worst for name, metric in METRICS.items()}
     return {name: metric.of(motion) for name, metric in METRICS.items()}

@@ -10,7 +10,7 @@ import numpy as np
 from dikbench.metrics.chatter import chattering
 from dikbench.metrics.motion import Motion
 from dikbench.metrics.outcome import Judgement, Outcome, Verdict
-from dikbench.scenario.violation import broken_limit, collision
+from dikbench.scenario.violation import POSITION_TOLERANCE, SPEED_TOLERANCE, broken_limit, collision
 from dikbench.scenario.witness import INSIDE_SHARE
 from dikbench.simulation.status import Status
 
@@ -50,18 +50,17 @@ def judge(motion: Motion, status: Status) -> Judgement:
     if along is None:
         return decided
     done_99, done_90, in_time = along.tolerances
-    extent = float(np.linalg.norm(along.path.points - along.path.points[0], axis=1).max())
+    extent = along.path.extent
     return replace(decided, done_99=done_99, done_90=done_90, in_time=in_time, extent=extent)
 
 
 def _holds(motion: Motion) -> bool:
     """Say whether the robot is at the start where it is to stay, so that it must not leave."""
     scenario, targets = motion.scenario, motion.target_points
-    moves = scenario.reference.moving or scenario.judged == "end"
-    away = max(
-        float(motion.tracking_error[0]), float(np.linalg.norm(targets - targets[0], axis=1).max())
-    )
-    return not moves and away <= scenario.tolerance_m
+    if scenario.reference.moving or scenario.judged == "end":
+        return False
+    away = float(np.linalg.norm(targets - targets[0], axis=1).max())
+    return max(float(motion.tracking_error[0]), away) <= scenario.tolerance_m
 
 
 def coped(motion: Motion, judgement: Judgement) -> float:
@@ -104,11 +103,23 @@ def _before_any_tolerance(motion: Motion, status: Status) -> Verdict | None:
     if status not in (Status.OK, Status.PROTECTIVE_STOP):
         return Verdict(Outcome.DID_NOT_RUN, last, reason=status.value)
     scenario, trace = motion.scenario, motion.trace
+    if not (_may_have_broken_a_limit(motion) or len(motion.clearance)):
+        return None
     late = trace.dt * np.arange(trace.steps + 1) >= INSIDE_SHARE * scenario.reference.duration
     found = collision(motion.clearance) or broken_limit(
         scenario.robot, trace.q, late, trace.applied, motion.accelerations, motion.torque_usage
     )
     return found and Verdict(Outcome(found.kind), found.step, found.figure, found.reason)
+
+
+def _may_have_broken_a_limit(motion: Motion) -> bool:
+    """Say whether a joint is past a limit at all, of how far it may be in `broken_limit`."""
+    return (
+        bool((motion.velocity_usage > SPEED_TOLERANCE).any())
+        or bool((motion.position_excess > POSITION_TOLERANCE).any())
+        or bool((motion.acceleration_excess > 0).any())
+        or bool((motion.torque_usage > 1).any())
+    )
 
 
 def _off_path(motion: Motion) -> Verdict:
@@ -127,7 +138,7 @@ def _off_path(motion: Motion) -> Verdict:
 
 def _chatter(motion: Motion) -> Verdict | None:
     """What is decided after any tolerance."""
-    mask = chattering(motion)
+    mask = motion.series(chattering)
     count = int(np.count_nonzero(mask))
     if count < CHATTER_STEPS or count <= CHATTER_SHARE * len(mask):
         return None

@@ -71,7 +71,7 @@ def series_metrics(
             best=best,
             worst=worst if worst is not None else low if best == "low" else high,
             definition=wording.format(definition),
-            of=lambda motion: reduce(values(motion)),
+            of=lambda motion: reduce(motion.series(values)),
             source=source,
         )
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
 import numpy as np
 
-from dikbench.arrays import Array, Indices
+from dikbench.arrays import Array, Indices, Mask
 from dikbench.metrics.along_path import AlongPath
 from dikbench.problem.constraints import CollisionConstraint, TorqueConstraint
-from dikbench.problem.progress import progress, row_weights
+from dikbench.problem.progress import off_course, progress, row_weights
 from dikbench.problem.tasks import PostureTask
 from dikbench.robots.kinematics import Kinematics, placements
 from dikbench.robots.limits import Interval
@@ -19,16 +20,42 @@ from dikbench.scenario.reference.path import NEGLIGIBLE_LENGTH_M
 from dikbench.scenario.scenario import Scenario
 from dikbench.simulation.trace import Trace
 
-SINGULAR_VALUE_STRIDE: Final = 16
+SINGULAR_VALUE_STRIDE: Final = 32
 """The singular values of one matrix in so many are computed in any case."""
 
 BLUR: Final = 1e-6
 """How much rounding may change a small singular value (m, rad) when its matrix is squared."""
 
 
+def is_finite(trace: Trace) -> bool:
+    """Whether every number of a trace that motions are made of is finite."""
+    recorded = (trace.q, trace.tau, trace.wanted, trace.applied)
+    return all(bool(np.isfinite(part).all()) for part in recorded)
+
+
+def _by_rows(values: Callable[[Motion], Array]) -> cached_property[Array]:
+    """Make a series of values that each follow from a step, or an instant and the step to it.
+
+    That of a part is cut out of the whole's, so that one call of numpy serves many trials.
+    """
+
+    def cut(motion: Motion) -> Array:
+        if motion.whole is None:
+            return values(motion)
+        found: Array = getattr(motion.whole, values.__name__)
+        first, of_steps = motion.first, len(found) == motion.whole.trace.steps
+        return found[first : first + motion.trace.steps + (not of_steps)]
+
+    cut.__doc__ = values.__doc__
+    return cached_property(cut)
+
+
 @dataclass(frozen=True, eq=False)
 class Motion:
     """A trace of n control steps and quantities derived from it, computed on first use.
+
+    It may be part of a whole: many motions of one scenario, one after the other, each beginning
+    anew at the start with a step that is none of any of them (see `motions_of`).
 
     Attributes:
         trace: the trace.
@@ -41,6 +68,8 @@ class Motion:
         jacobians: task Jacobians (m, rad), (n + 1, m, nv).
         points: placements of the task frame as points, (n + 1, d) [m] (see `Embedding`).
         target_points: those of its target, (n + 1, d) [m].
+        whole: the motion that it is part of, or None.
+        first: number of the instant of the whole at which it begins.
     """
 
     trace: Trace
@@ -51,8 +80,21 @@ class Motion:
     jacobians: Array
     points: Array
     target_points: Array
+    whole: Motion | None = None
+    first: int = 0
+
+    def series(self, values: Callable[[Motion], Array | Mask]) -> Array | Mask:
+        """Compute a series of the motion, on first use."""
+        if values not in self._series:
+            self._series[values] = values(self)
+        return self._series[values]
 
     @cached_property
+    def _series(self) -> dict[Callable[[Motion], Array | Mask], Array | Mask]:
+        """The series that were asked for, by what computes them."""
+        return {}
+
+    @_by_rows
     def achieved(self) -> Array:
         """Twist of the task frame under the applied velocity, (n, m) [m/s; rad/s]."""
         twists: Array = np.einsum("kij,kj->ki", self.jacobians[:-1], self.trace.applied)
@@ -61,22 +103,44 @@ class Motion:
     @cached_property
     def progress(self) -> Array:
         """Share of the desired motion that each step but dwells made, (k,) (see `progress`)."""
-        weights = row_weights(self.scenario.rows)
-        alpha = progress(self.trace.wanted, self.achieved, weights)
-        return alpha[~np.isnan(alpha)]
+        return self._alpha[~np.isnan(self._alpha)]
 
-    @cached_property
+    @_by_rows
+    def _alpha(self) -> Array:
+        """The same in every step, (n,); NaN in dwells."""
+        weights = row_weights(self.scenario.rows)
+        return progress(self.trace.wanted, self.achieved, weights)
+
+    @_by_rows
+    def direction_error(self) -> Array:
+        """Angle between the achieved and the desired twist of each step, (n,) [rad].
+
+        NaN in a dwell and where the robot stands still (see `off_course`).
+        """
+        weights = row_weights(self.scenario.rows)
+        return off_course(self.trace.wanted, self.achieved, weights)
+
+    @_by_rows
     def velocities(self) -> Array:
         """Joint velocity at the start and in each step, (n + 1, nv) [rad/s]."""
         return np.vstack([self.scenario.v0, self.trace.applied])
 
-    @cached_property
+    @_by_rows
     def accelerations(self) -> Array:
         """Joint acceleration into each step, (n, nv) [rad/s^2]."""
-        a: Array = np.diff(self.velocities, axis=0) / self.trace.dt
-        return a
+        return self.jumps / self.trace.dt
+
+    @_by_rows
+    def jumps(self) -> Array:
+        """Change of the joint velocity into each step, (n, nv) [rad/s]."""
+        return np.diff(self.velocities, axis=0)
 
     @cached_property
+    def acceleration_changes(self) -> Array:
+        """Change of the acceleration from each step to the next, (n - 1, nv) [rad/s^2]."""
+        return np.diff(self.accelerations, axis=0)
+
+    @_by_rows
     def position_excess(self) -> Array:
         """Largest distance of a joint outside its position limits, (n + 1,) [rad or m].
 
@@ -85,17 +149,26 @@ class Motion:
         limits = self.scenario.robot.limits
         return _worst_excess(self.trace.q[:, limits.q_index], limits.position)
 
-    @cached_property
+    @_by_rows
     def velocity_excess(self) -> Array:
         """The same for the velocity limits, in each step, (n,) [rad/s or m/s]."""
         return _worst_excess(self.trace.applied, self.scenario.robot.limits.velocity)
 
-    @cached_property
+    @_by_rows
+    def velocity_usage(self) -> Array:
+        """Largest joint speed over its limit in each step, (n,); 0 without limits."""
+        limit = self.scenario.robot.limits.velocity
+        if limit is None:
+            return np.zeros(self.trace.steps)
+        usage: Array = limit.usage(self.trace.applied).max(axis=1, initial=0.0)
+        return usage
+
+    @_by_rows
     def acceleration_excess(self) -> Array:
         """The same for the acceleration limits, into each step, (n,) [rad/s^2 or m/s^2]."""
         return _worst_excess(self.accelerations, self.scenario.robot.limits.acceleration)
 
-    @cached_property
+    @_by_rows
     def contour_error(self) -> Array:
         """Distance of the task frame from the path of the reference, (n + 1,) [m].
 
@@ -108,7 +181,7 @@ class Motion:
             return self.position_error
         return path.distances(self.translations)
 
-    @cached_property
+    @_by_rows
     def tracking_error(self) -> Array:
         """Distance from the target in position and orientation, (n + 1,) [m] (see `Embedding`).
 
@@ -118,7 +191,7 @@ class Motion:
         farthest: Array = np.maximum(away, self._held_apart[0])
         return farthest
 
-    @cached_property
+    @_by_rows
     def contour_error_6d(self) -> Array:
         """Distance from the path in position and orientation, (n + 1,) [m] (see `Embedding`).
 
@@ -134,9 +207,31 @@ class Motion:
     @cached_property
     def nearest_on_path(self) -> tuple[Array, Indices, Array]:
         """See `EmbeddedPath.nearest`: of the task frame, at every instant."""
+        if self.whole is not None:
+            rows = slice(self.first, self.first + self.trace.steps + 1)
+            away, pieces, shares = self.whole.nearest_on_path
+            return away[rows], pieces[rows], shares[rows]
         path = self.scenario.embedded_path
         assert path is not None
         return path.nearest(self.points)
+
+    @_by_rows
+    def along_and_across(self) -> Array:
+        """Length of each step of x along the tangent of the path and across it, (n, 2) [m].
+
+        The tangent is the mean of those where it is nearest to the step's beginning and its end.
+        """
+        path = self.scenario.embedded_path
+        assert path is not None
+        steps, tangents = np.diff(self.points, axis=0), path.tangents(*self.nearest_on_path[1:])
+        before, after = tangents[:-1], tangents[1:]
+        turned_back = np.einsum("ij,ij->i", before, after) < 0
+        means = before + np.where(turned_back, -1.0, 1.0)[:, None] * after
+        sizes = np.linalg.norm(means, axis=1, keepdims=True)
+        means /= np.where(sizes > 0, sizes, 1.0)
+        along = np.einsum("ij,ij->i", steps, means)
+        across = np.linalg.norm(steps - along[:, None] * means, axis=1)
+        return np.stack([along, across], axis=1)
 
     @cached_property
     def along_path(self) -> AlongPath | None:

@@ -1,15 +1,18 @@
-"""The motion of a trace: poses, errors and Jacobians of the recorded configurations."""
+"""The motions of traces: poses, errors and Jacobians of the recorded configurations."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from dikbench.arrays import Array
+from dikbench.arrays import Array, Indices
 from dikbench.errors import DikbenchError
 from dikbench.metrics.motion import Motion
 from dikbench.problem.tasks.rows import orientation_error
 from dikbench.robots.kinematics import Kinematics, placements
-from dikbench.scenario.scenario import Scenario
+from dikbench.scenario.reference.reference import Reference
+from dikbench.scenario.scenario import REST_ROUNDING_S, Scenario
 from dikbench.simulation.trace import Trace
 
 
@@ -26,17 +29,70 @@ def motion_of(trace: Trace, scenario: Scenario, jacobians: Array | None = None) 
         DikbenchError: if the trace is not one of the scenario's robot.
     """
     _check_sizes(trace, scenario)
-    robot, frame = scenario.robot, scenario.robot.frame_id
-    n, rows = trace.steps, np.array(scenario.rows)
-    X = placements(robot, frame, trace.q)
-    kinematics, J = Kinematics(robot), np.empty((n + 1, len(rows), robot.nv))
-    known = 0 if jacobians is None else n
+    missing = np.arange(0 if jacobians is None else trace.steps, trace.steps + 1)
+    J = np.empty((trace.steps + 1, len(scenario.rows), scenario.robot.nv))
     if jacobians is not None:
-        J[:n] = jacobians
-    for k, q in enumerate(trace.q[known:], start=known):
-        kinematics.update(q)
+        J[:-1] = jacobians
+    return _motion(trace, scenario, J, missing, *_targets(trace, scenario))
+
+
+def motions_of(
+    traces: Sequence[Trace], scenario: Scenario, jacobians: Sequence[Array | None]
+) -> list[Motion]:
+    """Compute the motions of several traces of one scenario, each as `motion_of` does.
+
+    What follows for each row of a trace by itself is computed for all rows together, so that one
+    call of numpy serves all. They are parts of a whole, in which a step that is none of theirs
+    leads from the end of each back to the start.
+
+    Args:
+        traces: the records, finite.
+        scenario: their case.
+        jacobians: see `motion_of`, of each.
+
+    Raises:
+        DikbenchError: if a trace is not one of the scenario's robot.
+    """
+    for trace in traces:
+        _check_sizes(trace, scenario)
+    nv, m = scenario.robot.nv, len(scenario.rows)
+    ends = np.cumsum([trace.steps + 1 for trace in traces])
+    wanted, applied = np.zeros((ends[-1], m)), np.tile(scenario.v0, (ends[-1], 1))
+    J, missing = np.empty((ends[-1], m, nv)), np.ones(ends[-1], dtype=bool)
+    firsts = [int(end) - trace.steps - 1 for end, trace in zip(ends, traces, strict=True)]
+    for first, trace, known in zip(firsts, traces, jacobians, strict=True):
+        steps = slice(first, first + trace.steps)
+        wanted[steps], applied[steps] = trace.wanted, trace.applied
+        if known is not None:
+            J[steps], missing[steps] = known, False
+    # What no series of rows reads is left empty.
+    none, nothing = np.empty(0, dtype=int), np.empty(0)
+    q, tau = (np.concatenate([getattr(trace, name) for trace in traces]) for name in ("q", "tau"))
+    record = Trace(
+        scenario.dt, q, tau, wanted[:-1], applied[:-1], applied[:-1], none, none, none, none,
+        nothing, nothing, nothing, nothing,
+    )  # fmt: skip
+    rotations, translations = zip(*(_targets(trace, scenario) for trace in traces), strict=True)
+    targets = np.concatenate(rotations), np.concatenate(translations)
+    whole = _motion(record, scenario, J, np.flatnonzero(missing), *targets)
+    return [_part(whole, first, trace) for first, trace in zip(firsts, traces, strict=True)]
+
+
+def _motion(
+    trace: Trace,
+    scenario: Scenario,
+    J: Array,
+    missing: Indices,
+    target_rotations: Array,
+    target_translations: Array,
+) -> Motion:
+    """Compute a motion; the Jacobians (n + 1, m, nv) that are missing are written into J."""
+    robot, embedding, rows = scenario.robot, scenario.embedding, np.array(scenario.rows)
+    kinematics = Kinematics(robot, robot.scratch)
+    for k in missing.tolist():
+        kinematics.update(trace.q[k])
         J[k] = kinematics.task_jacobian(rows)
-    target_rotations, target_translations = _targets(trace, scenario)
+    X = placements(robot, robot.frame_id, trace.q)
     position, orientation = _errors(scenario, X, target_rotations, target_translations)
     return Motion(
         trace=trace,
@@ -45,8 +101,25 @@ def motion_of(trace: Trace, scenario: Scenario, jacobians: Array | None = None) 
         position_error=position,
         orientation_error=orientation,
         jacobians=J,
-        points=scenario.embedding.points(X[:, :3, :3], X[:, :3, 3]),
-        target_points=scenario.embedding.points(target_rotations, target_translations),
+        points=embedding.points(X[:, :3, :3], X[:, :3, 3]),
+        target_points=embedding.points(target_rotations, target_translations),
+    )
+
+
+def _part(whole: Motion, first: int, trace: Trace) -> Motion:
+    """Cut the motion of a trace that begins at an instant out of a whole."""
+    rows = slice(first, first + trace.steps + 1)
+    return Motion(
+        trace,
+        whole.scenario,
+        whole.translations[rows],
+        whole.position_error[rows],
+        whole.orientation_error[rows],
+        whole.jacobians[rows],
+        whole.points[rows],
+        whole.target_points[rows],
+        whole,
+        first,
     )
 
 
@@ -99,8 +172,17 @@ def _targets(trace: Trace, scenario: Scenario) -> tuple[Array, Array]:
     if n <= scenario.steps and np.array_equal(trace.tau, np.arange(n + 1) * scenario.dt):
         rotations, translations = scenario.target_arrays
         return rotations[: n + 1], translations[: n + 1]
-    placements = [scenario.target(float(tau))[0] for tau in trace.tau]
-    return np.array([X.rotation for X in placements]), np.array([X.translation for X in placements])
+    reference, tau = scenario.reference, trace.tau
+    if reference.moving:  # see `Scenario.target`
+        over = reference.duration - tau < REST_ROUNDING_S
+        tau = np.where(over, reference.duration, tau)
+    return _placements(reference, tau)
+
+
+def _placements(reference: Reference, times: Array) -> tuple[Array, Array]:
+    """Return the rotations (k, 3, 3) and translations (k, 3) [m] of a reference at times [s]."""
+    placed = [reference.placement(tau) for tau in times.tolist()]
+    return np.array([X.rotation for X in placed]), np.array([X.translation for X in placed])
 
 
 def rotation_angles(first: Array, second: Array) -> Array:

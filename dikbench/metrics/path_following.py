@@ -47,16 +47,7 @@ def course(motion: Motion) -> float:
     moving = speeds > DWELL_SPEED_M_S
     if not moving.any():
         return NAN
-    steps = np.diff(motion.points, axis=0)[moving]
-    _, nearest, shares = motion.nearest_on_path
-    tangents = path.tangents(nearest, shares)
-    before, after = tangents[:-1][moving], tangents[1:][moving]
-    turned_back = np.einsum("ij,ij->i", before, after) < 0
-    tangents = before + np.where(turned_back, -1.0, 1.0)[:, None] * after
-    sizes = np.linalg.norm(tangents, axis=1, keepdims=True)
-    tangents /= np.where(sizes > 0, sizes, 1.0)
-    along = np.einsum("ij,ij->i", steps, tangents)
-    across = np.linalg.norm(steps - along[:, None] * tangents, axis=1)
+    along, across = motion.along_and_across[moving].T.copy()
     if not (along.any() or across.any()):
         return NAN
     return atan2(float(across.sum()), float(np.abs(along).sum()))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import sqrt
 from types import MappingProxyType
 from typing import Any
 
@@ -27,18 +28,17 @@ class Reduction:
 
 def rms(values: Array) -> float:
     """Compute the root mean square; NaN without values."""
-    return float(np.sqrt(np.mean(np.square(values)))) if len(values) else float("nan")
+    return sqrt(np.add.reduce(values * values) / len(values)) if len(values) else float("nan")
 
 
 def largest(values: Array) -> float:
     """Return the largest of the values that are defined; NaN where none is."""
-    defined = values[~np.isnan(values)]
-    return float(defined.max()) if len(defined) else float("nan")
+    return float(np.fmax.reduce(values)) if len(values) else float("nan")
 
 
 def smallest(values: Array) -> float:
     """Return the smallest of the values that are defined; NaN where none is."""
-    return -largest(-values)
+    return float(np.fmin.reduce(values)) if len(values) else float("nan")
 
 
 def percentile_95(values: Array) -> float:
@@ -59,7 +59,7 @@ def last(values: Array) -> float:
 
 def mean(values: Array | Mask) -> float:
     """Compute the mean, of a mask the share that is set; NaN of nothing."""
-    return float(np.mean(values)) if len(values) else float("nan")
+    return float(np.add.reduce(values) / len(values)) if len(values) else float("nan")
 
 
 def number_set(mask: Mask) -> float:

@@ -36,7 +36,7 @@ def jerk_rms_scaled(motion: Motion) -> float:
     q = np.cumsum(motion.trace.applied, axis=0) * motion.trace.dt
     extent = q.max(axis=0, initial=0.0) - q.min(axis=0, initial=0.0)
     amplitude, duration = float(np.linalg.norm(extent)), motion.trace.steps * motion.trace.dt
-    jerk = np.diff(motion.accelerations, axis=0) / motion.trace.dt
+    jerk = motion.acceleration_changes / motion.trace.dt
     if not len(jerk) or amplitude <= NEGLIGIBLE_SPEED_RAD_S * motion.trace.dt:
         return float("nan")
     return float(np.sqrt(np.sum(np.square(jerk)) / len(jerk)) * duration**3 / amplitude)
@@ -44,7 +44,7 @@ def jerk_rms_scaled(motion: Motion) -> float:
 
 def acceleration_variation(motion: Motion) -> float:
     """Compute the sum over joints and steps of |a_k+1 - a_k| [rad/s^2]."""
-    return float(np.abs(np.diff(motion.accelerations, axis=0)).sum())
+    return float(np.abs(motion.acceleration_changes).sum())
 
 
 def reversals(motion: Motion) -> float:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-
-import numpy as np
+from functools import reduce
+from operator import or_
 
 from dikbench.arrays import Array, Mask
 from dikbench.metrics.metric import Metric, series_metrics
@@ -19,8 +19,7 @@ FALLBACK_STATUSES = (Status.INFEASIBLE, Status.SOLVER_FAILED)
 def _has_status(motion: Motion, *statuses: Status) -> Mask:
     """Return which steps have one of these statuses, (n,)."""
     codes = motion.trace.status
-    mask: Mask = np.logical_or.reduce([codes == STEP_CODE[status] for status in statuses])
-    return mask
+    return reduce(or_, [codes == STEP_CODE[status] for status in statuses])
 
 
 def _share(name: str, status: Status, definition: str) -> tuple[Metric, ...]:

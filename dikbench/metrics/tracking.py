@@ -7,22 +7,12 @@ from typing import Final
 
 import numpy as np
 
-from dikbench.arrays import Array
 from dikbench.metrics.metric import INF, Metric, series_metrics
 from dikbench.metrics.motion import Motion
-from dikbench.problem.progress import STUCK_PROGRESS, off_course, row_weights
+from dikbench.problem.progress import STUCK_PROGRESS
 
 RECOVERED_POSITION_ERROR_M: Final = 1e-3
 """Position error below which a frame has recovered."""
-
-
-def direction_error(motion: Motion) -> Array:
-    """Compute the angle between the achieved and the desired twist of each step, (n,) [rad].
-
-    NaN in a dwell and where the robot stands still (see `off_course`).
-    """
-    weights = row_weights(motion.scenario.rows)
-    return off_course(motion.trace.wanted, motion.achieved, weights)
 
 
 def recovery_time(motion: Motion) -> float:
@@ -69,7 +59,7 @@ TRACKING = (
     *series_metrics(
         "direction_error", "rad",
         "angle between J v and the twist that the task asks for there (L = 0.2 m): 0 for J^+ V",
-        direction_error, "max", worst=pi,
+        lambda m: m.direction_error, "max", worst=pi,
     ),
     *series_metrics(
         "progress", "",

@@ -18,8 +18,9 @@ solver's tolerance; the largest violation has its own column."""
 
 def _velocity_usage(motion: Motion) -> float:
     """Compute the largest joint speed over its limit; NaN of no step, or without limits."""
-    limit, v = motion.scenario.robot.limits.velocity, motion.trace.applied
-    return float(limit.usage(v).max()) if limit is not None and len(v) else float("nan")
+    if motion.scenario.robot.limits.velocity is None or not motion.trace.steps:
+        return float("nan")
+    return float(motion.velocity_usage.max())
 
 
 def _violation(

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType
 from typing import Final
 
+from dikbench.errors import DikbenchError
 from dikbench.metrics import METRICS, OUTCOME_NUMBERS, OUTCOME_TEXTS
-from dikbench.results.columns import REDEFINED, RENAMED_METRICS, RENAMED_TIMES, SEES, TIMES
+from dikbench.results.columns import KEYS, REDEFINED, RENAMED_METRICS, RENAMED_TIMES, SEES, TIMES
 
 SCHEMA_VERSION: Final = 4
 """Version of the tables below. Stores of versions 1 to 3 are brought to it when they are
@@ -17,6 +20,14 @@ RENAMING_VERSIONS: Final = ("1", "2")
 """Versions in which some metrics had other definitions."""
 
 NUMBERS: Final = (*METRICS, *OUTCOME_NUMBERS, *SEES, "wall_time_s", "control_time_s")
+
+ROW: Final[Mapping[str, str | None]] = MappingProxyType(
+    {
+        name: "" if name in OUTCOME_TEXTS else None
+        for name in ("id", *KEYS, "steps", *OUTCOME_TEXTS, *NUMBERS, "environment")
+    }
+)
+"""The columns of a finished trial, and what they hold where nothing is known."""
 
 EMPTY_TEXT: Final = "TEXT NOT NULL DEFAULT ''"
 
@@ -49,6 +60,20 @@ CREATE TABLE times (
 plan and shown last. It is `superseded`, kept but not shown, where its formulation or its
 scenario had another source than at the last run, so that no average is over rows of two sources;
 times are alike."""
+
+
+def check_format(database: sqlite3.Connection, path: Path) -> None:
+    """Check that an open file is a database.
+
+    Raises:
+        DikbenchError: if it is not.
+    """
+    try:
+        database.execute("PRAGMA schema_version").fetchone()
+    except sqlite3.DatabaseError as error:
+        raise DikbenchError(
+            f"store {path}: not a store of dikbench ({error}); move it away and run again"
+        ) from None
 
 
 def migrate(database: sqlite3.Connection, version: str, columns: Sequence[str]) -> None:

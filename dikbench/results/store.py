@@ -15,8 +15,8 @@ import pandas as pd
 
 from dikbench.errors import DikbenchError
 from dikbench.metrics import OUTCOME_TEXTS
-from dikbench.results.columns import KEYS, RENAMED_METRICS, TIMED, TIMES, TRIAL
-from dikbench.results.schema import EMPTY_TEXT, NUMBERS, SCHEMA_VERSION, TABLES, migrate
+from dikbench.results.columns import RENAMED_METRICS, TIMED, TIMES, TRIAL
+from dikbench.results.schema import NUMBERS, ROW, SCHEMA_VERSION, TABLES, check_format, migrate
 from dikbench.results.versions import is_outdated, versions_of_rows
 from dikbench.scenario.oracle import ORACLES
 from dikbench.study.identity import timing_id, timing_id_today, trial_id_today
@@ -46,7 +46,7 @@ class StoredTrial:
 
 
 class Store:
-    """An open store; one process writes, committing every row, others may read.
+    """An open store; one process writes, committing rows as they come, others may read.
 
     Args:
         path: its file.
@@ -58,7 +58,7 @@ class Store:
         self.path = path
         with self._guarded():
             self._database = sqlite3.connect(path, isolation_level=None)
-            self._check_format()
+            check_format(self._database, path)
             self._database.execute("PRAGMA journal_mode = WAL")
             self._database.execute("PRAGMA synchronous = NORMAL")
             if self._database.execute("SELECT COUNT(*) FROM sqlite_master").fetchone()[0]:
@@ -72,6 +72,7 @@ class Store:
                     )
                 self._database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
         self._file = path.stat()
+        self._described: tuple[Mapping[str, Any] | None, str] = None, ""  # of the last row
         self._environments = {row[0] for row in self._rows("SELECT id FROM environments")}
 
     def __enter__(self) -> Self:
@@ -186,18 +187,22 @@ class Store:
         Returns:
             Its name, which rows refer to.
         """
-        text = json.dumps(description, sort_keys=True)
-        name = hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
-        if name not in self._environments:
-            self._insert("environments", {"id": name, "description": text})
-            self._environments.add(name)
-        return name
+        if self._described[0] != description:
+            text = json.dumps(description, sort_keys=True)
+            name = hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
+            if name not in self._environments:
+                self._insert("environments", ("id", "description"), [(name, text)])
+                self._environments.add(name)
+            self._described = dict(description), name
+        return self._described[1]
 
-    def record_trial(self, row: Mapping[str, Any], run: int, position: int) -> None:
-        """Commit the row of a finished trial, replacing an earlier one."""
-        columns = ("id", *KEYS, "steps", *OUTCOME_TEXTS, *NUMBERS, "environment")
-        values = {name: row.get(name, "" if name in OUTCOME_TEXTS else None) for name in columns}
-        self._insert("trials", {**values, "run": run, "position": position})
+    def record_trials(self, rows: Sequence[tuple[Mapping[str, Any], int]], run: int) -> None:
+        """Commit rows of trials and their positions, all or none, in place of earlier ones."""
+        values = [
+            (*(row.get(name, nothing) for name, nothing in ROW.items()), run, position)
+            for row, position in rows
+        ]
+        self._insert("trials", (*ROW, "run", "position"), values)
 
     def record_metrics(self, trial: str, metrics: Mapping[str, Any]) -> None:
         """Commit the metrics and the outcome of a trial that has a row, and nothing else of it."""
@@ -211,12 +216,11 @@ class Store:
     def record_times(self, row: Mapping[str, Any], run: int) -> None:
         """Commit the times of a cell."""
         columns = ("id", *TIMED, *TIMES, "environment")
-        self._insert("times", {**{name: row.get(name) for name in columns}, "run": run})
+        self._insert("times", (*columns, "run"), [(*map(row.get, columns), run)])
 
     def trials(self) -> pd.DataFrame:
         """Return every trial with its times, those of the last plan first and in its order."""
-        columns = ["id", *KEYS, "steps", *OUTCOME_TEXTS, *NUMBERS, "environment", "run"]
-        order = ", ".join(columns)
+        order = ", ".join((*ROW, "run"))
         trials = self._frame(
             f"SELECT {order} FROM trials WHERE NOT superseded "
             f"ORDER BY position IS NULL, position, {', '.join(TRIAL)}",
@@ -277,13 +281,14 @@ class Store:
         with self._guarded():
             return self._database.execute(query).fetchall()
 
-    def _insert(self, table: str, values: Mapping[str, Any]) -> None:
+    def _insert(
+        self, table: str, columns: Sequence[str], rows: Sequence[tuple[str | float | None, ...]]
+    ) -> None:
         self._check_untouched()
-        marks = ", ".join("?" * len(values))
-        with self._guarded():
-            self._database.execute(
-                f"INSERT OR REPLACE INTO {table} ({', '.join(values)}) VALUES ({marks})",
-                list(values.values()),
+        marks = ", ".join("?" * len(columns))
+        with self._guarded(), self._transaction():
+            self._database.executemany(
+                f"INSERT OR REPLACE INTO {table} ({', '.join(columns)}) VALUES ({marks})", rows
             )
 
     @contextmanager
@@ -305,14 +310,6 @@ class Store:
             raise DikbenchError(
                 f"store {self.path}: {reason}; what was committed before is kept"
             ) from error
-
-    def _check_format(self) -> None:
-        try:
-            self._database.execute("PRAGMA schema_version").fetchone()
-        except sqlite3.DatabaseError as error:
-            raise DikbenchError(
-                f"store {self.path}: not a store of dikbench ({error}); move it away and run again"
-            ) from None
 
     def _check_schema(self, *, add_metrics: bool) -> None:
         try:
@@ -336,7 +333,7 @@ class Store:
             with self._guarded(), self._transaction():
                 migrate(self._database, found["schema"], columns)
         for name in missing:
-            kind = EMPTY_TEXT if name in OUTCOME_TEXTS else "REAL"
+            kind = "REAL" if ROW[name] is None else f"TEXT NOT NULL DEFAULT '{ROW[name]}'"
             self._database.execute(f"ALTER TABLE trials ADD COLUMN {name} {kind}")
 
     def _check_untouched(self) -> None:

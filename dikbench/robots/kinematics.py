@@ -92,8 +92,17 @@ def smallest_singular_value(J: Array) -> float:
 def placements(robot: Robot, frame: int, q: Array) -> Array:
     """Compute the placements of a frame at configurations (n, nq), (n, 4, 4)."""
     model, data = robot.model, robot.model.createData()
-    found = []
+    # Views of what every update writes; to make a matrix of each takes as long as the kinematics.
+    X = data.oMf[frame]
+    R_T, p = X.rotation.T, X.translation
+    rotations, translations = [], []
     for each in q:
         pin.forwardKinematics(model, data, each)
-        found.append(pin.updateFramePlacement(model, data, frame).homogeneous)
-    return np.array(found)
+        pin.updateFramePlacement(model, data, frame)
+        rotations.append(R_T.tobytes())
+        translations.append(p.tobytes())
+    found = np.zeros((len(q), 4, 4))
+    found[:, :3, :3] = np.frombuffer(b"".join(rotations)).reshape(-1, 3, 3).transpose(0, 2, 1)
+    found[:, :3, 3] = np.frombuffer(b"".join(translations)).reshape(-1, 3)
+    found[:, 3, 3] = 1.0
+    return found

@@ -113,7 +113,7 @@ def run_study(study: Study, out: Path, settings: RunSettings, command: str) -> R
             with ProgressDisplay(len(todo), "trials") as display:
                 for trial, row in run_trials(todo, folder, settings, commit, command):
                     row["environment"] = store.environment(row.pop("described", worker))
-                    store.record_trial({"id": trial.id, **row}, run, positions[trial.id])
+                    store.record_trials([({"id": trial.id, **row}, positions[trial.id])], run)
                     display.advance()
             if study.timing is not None:
                 known = set() if settings.rerun == "all" else store.timed() - outdated

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Literal
 
 from dikbench.errors import DikbenchError
-from dikbench.metrics import Outcome, evaluate, motion_of, outcome_columns
+from dikbench.metrics import Measured, Outcome, measure
 from dikbench.plugins.building import make_formulation, make_plant, make_scenario
 from dikbench.problem.posing import pose_problem
 from dikbench.problem.problem import (
@@ -164,13 +163,9 @@ def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "al
         policy == "all" or (policy == "failures" and run.status is not Status.OK)
     ):
         _keep(run.trace.save, trace)
-    metrics: Mapping[str, Any] = {}
-    if run.trace.steps:
-        seen = (
-            None if plant.noise else run.jacobians
-        )  # noise makes them differ from the true motion's
-        motion = motion_of(run.trace, scenario, seen)
-        metrics = {**evaluate(motion), **outcome_columns(motion, run.status)}
+    # Noise makes the Jacobians that the formulation had differ from the true motion's.
+    jacobians = None if plant.noise else run.jacobians
+    metrics = measure([Measured(run.trace, scenario, jacobians, run.status)])[0]
     return {
         **row_without_run(trial, run.status, run.message),
         "steps": run.trace.steps,

@@ -8,10 +8,10 @@ from math import sqrt
 from typing import Any, Final
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from dikbench.arrays import Array, Indices
 from dikbench.problem.embedding import Embedding
+from dikbench.scenario.reference.path import feet, vertex_tree
 from dikbench.scenario.reference.reference import Reference
 
 SAMPLES_PER_PERIOD: Final = 4
@@ -72,26 +72,14 @@ class EmbeddedPath:
         squares: Array = np.einsum("ij,ij->i", self.pieces, self.pieces)
         return squares
 
+    @cached_property
+    def extent(self) -> float:
+        """Largest distance of a sample from the first one [m]."""
+        return float(np.linalg.norm(self.points - self.points[0], axis=1).max())
+
     def last_until(self, times: Any) -> Any:
         """Find the last sample whose nominal time is not after these [s]: its number."""
         return np.searchsorted(self.times, np.asarray(times) + SAME_INSTANT_S, side="right") - 1
-
-    def feet(self, points: Array, pieces: Indices) -> tuple[Array, Array]:
-        """Compute each point's nearest point of a piece: share of its length, square distance.
-
-        Args:
-            points: (..., d) [m].
-            pieces: the number of a piece for each, (...).
-
-        Returns:
-            Two arrays (...): 0 at the piece's start to 1 at its end, and [m^2].
-        """
-        away, along, squares = points - self.points[pieces], self.pieces[pieces], self.squares
-        share = np.einsum("...i,...i->...", away, along)
-        share /= np.maximum(squares[pieces], np.finfo(float).tiny)
-        np.clip(share, 0.0, 1.0, out=share)
-        away = away - share[..., None] * along
-        return share, np.einsum("...i,...i->...", away, away)
 
     def nearest(self, points: Array) -> tuple[Array, Indices, Array]:
         """Find the nearest points of the path as a set; of equally near ones the first.
@@ -112,7 +100,7 @@ class EmbeddedPath:
             away, ends = away.reshape(-1, count), ends.reshape(-1, count)
             pieces = long[np.hstack([np.maximum(ends - 1, 0), np.minimum(ends, len(long) - 1)])]
             pieces.sort(axis=1)
-            share, square = self.feet(points[open_, None], pieces)
+            share, square = feet(points[open_], pieces, self.points, self.pieces, self.squares)
             squares[open_] = square.min(axis=1)
             best = (square <= squares[open_, None] + SAME_DISTANCE_M2).argmax(axis=1)[:, None]
             nearest[open_] = np.take_along_axis(pieces, best, axis=1)[:, 0]
@@ -127,18 +115,14 @@ class EmbeddedPath:
     def _tree(self) -> tuple[Any, float, Indices]:
         """The ends of the pieces that make up the path as a set, but for those without length.
 
-        A tree of the ends, the number i that of piece i - 1 and the start of piece i, with another
-        coordinate so that square distances less a constant [m^2] are those that the two pieces have
-        at least, |x - end|^2 - (length / 2)^2; the constant; and the numbers of the pieces, (b,).
+        The tree of the ends, the number i that of piece i - 1 and the start of piece i, and its
+        constant (see `vertex_tree`); and the numbers of the pieces, (b,).
         """
         long = np.flatnonzero(self.squares[: self.once] > 0)
         if not len(long):
             long = np.zeros(1, dtype=int)
-        halves = self.squares[long] / 4
-        halves = np.maximum(np.append(halves, 0.0), np.append(0.0, halves))
-        most = float(halves.max())
         ends = self.points[np.append(long, long[-1] + 1)]
-        return cKDTree(np.column_stack([ends, np.sqrt(most - halves)])), most, long
+        return *vertex_tree(ends, self.squares[long]), long
 
     def latest_nearest(self, point: Array, first: float, last: float) -> float:
         """Find the nominal time of the nearest point of a part of the path [s].

@@ -27,6 +27,9 @@ NEGLIGIBLE_LENGTH_M: Final = 1e-9
 FIRST_NEIGHBOUR_COUNT: Final = 3
 """Number of nearest vertices that are searched first."""
 
+POINTS_TOGETHER: Final = 128
+"""Feet of so many points are computed at once: the arrays of more do not stay in the cache."""
+
 
 @dataclass(frozen=True, eq=False)
 class ReferencePath:
@@ -61,46 +64,79 @@ class ReferencePath:
         if self.is_point:
             away: Array = np.linalg.norm(points - self.vertices[0], axis=1)
             return away
-        tree, half = self._tree
-        nearest, unsettled = np.full(len(points), np.inf), np.arange(len(points))
-        count = FIRST_NEIGHBOUR_COUNT
-        while len(unsettled):
+        tree, most = self._tree
+        squares, open_ = np.full(len(points), np.inf), np.arange(len(points))
+        asked, count = np.column_stack([points, np.zeros(len(points))]), FIRST_NEIGHBOUR_COUNT
+        while len(open_):
             count = min(count, tree.n)
-            there, vertices = tree.query(points[unsettled], count)
-            there, vertices = there.reshape(-1, count), vertices.reshape(-1, count)
-            pieces = np.stack([np.maximum(vertices - 1, 0), np.minimum(vertices, self.once - 1)])
-            squares = [self.feet(points[unsettled, None], each)[1] for each in pieces]
-            nearest[unsettled] = np.sqrt(np.min(squares, axis=(0, 2)))
+            away, ends = tree.query(asked[open_], count)
+            away, ends = away.reshape(-1, count), ends.reshape(-1, count)
+            pieces = np.hstack([np.maximum(ends - 1, 0), np.minimum(ends, self.once - 1)])
+            found = feet(points[open_], pieces, self.vertices, self.pieces, self.squares)[1]
+            squares[open_] = np.minimum(squares[open_], found.min(axis=1))
             if count == tree.n:
                 break
-            # The remaining pieces end in vertices that are farther away than these.
-            floor = np.sqrt(np.maximum(there[:, -1] ** 2 - half**2, 0.0))
-            unsettled = unsettled[nearest[unsettled] > floor + CHORD_ERROR_M]
+            # No piece of another vertex is nearer than this.
+            open_ = open_[squares[open_] > away[:, -1] ** 2 - most]
             count *= 4
-        return nearest
+        distances: Array = np.sqrt(squares)
+        return distances
 
     @cached_property
     def _tree(self) -> tuple[Any, float]:
-        """The vertices of the path as a set, and half the length of its longest piece [m]."""
-        lengths = np.linalg.norm(self.pieces[: self.once], axis=1)
-        return cKDTree(self.vertices[: self.once + 1]), float(lengths.max()) / 2
+        """The vertices of the path as a set; see `vertex_tree`."""
+        vertices = self.vertices[: self.once + 1]
+        return vertex_tree(vertices, self.squares[: self.once])
 
-    def feet(self, points: Array, pieces: Indices) -> tuple[Array, Array]:
-        """Compute each point's nearest point of a piece: share of its length, square distance.
 
-        Args:
-            points: (..., 3) [m].
-            pieces: the number of a piece for each, (...).
+def vertex_tree(vertices: Array, squares: Array) -> tuple[Any, float]:
+    """Make a tree in which pieces are no nearer than their ends, whatever the pieces' lengths.
 
-        Returns:
-            Two arrays (...): 0 at the piece's start to 1 at its end, and [m^2].
-        """
-        away, along = points - self.vertices[pieces], self.pieces[pieces]
-        share = np.einsum("...i,...i->...", away, along)
-        share /= self.squares[pieces]
-        np.clip(share, 0.0, 1.0, out=share)
-        away -= share[..., None] * along
-        return share, np.einsum("...i,...i->...", away, away)
+    It is of the vertices with another coordinate, so that square distances less a constant are
+    those that the two pieces at a vertex have at least, |x - vertex|^2 - (length / 2)^2.
+
+    Args:
+        vertices: of a chain of pieces, (k + 1, d) [m].
+        squares: square lengths of the pieces, (k,) [m^2].
+
+    Returns:
+        The tree, (d + 1) coordinates each, and the constant [m^2].
+    """
+    halves = squares / 4
+    halves = np.maximum(np.append(halves, 0.0), np.append(0.0, halves))
+    most = float(halves.max())
+    return cKDTree(np.column_stack([vertices, np.sqrt(most - halves)])), most
+
+
+def feet(
+    points: Array, pieces: Indices, starts: Array, ways: Array, squares: Array
+) -> tuple[Array, Array]:
+    """Compute each point's nearest points of pieces: shares of their lengths, square distances.
+
+    Args:
+        points: (n, d) [m].
+        pieces: the numbers of k pieces for each, (n, k).
+        starts: of all pieces, (f, d) [m].
+        ways: from their starts to their ends, (f, d) [m].
+        squares: square lengths of all, (f,) [m^2].
+
+    Returns:
+        Two arrays (n, k): 0 at the piece's start to 1 at its end, and [m^2].
+    """
+    shares, found = np.empty(pieces.shape), np.empty(pieces.shape)
+    for first in range(0, len(points), POINTS_TOGETHER):
+        part = slice(first, first + POINTS_TOGETHER)
+        asked = pieces[part].ravel()
+        away, along = np.repeat(points[part], pieces.shape[1], axis=0), ways.take(asked, axis=0)
+        away -= starts.take(asked, axis=0)
+        share = np.einsum("ij,ij->i", away, along)
+        share /= np.maximum(squares.take(asked), np.finfo(float).tiny)
+        np.minimum(np.maximum(share, 0.0, out=share), 1.0, out=share)
+        along *= share[:, None]
+        away -= along
+        shares[part] = share.reshape(-1, pieces.shape[1])
+        found[part] = np.einsum("ij,ij->i", away, away).reshape(-1, pieces.shape[1])
+    return shares, found
 
 
 def reference_path(reference: Reference, dt: float) -> ReferencePath:

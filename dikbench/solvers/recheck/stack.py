@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import attrgetter
 
 import numpy as np
 
@@ -47,7 +48,8 @@ class Stack:
 
 
 def _stacked(owners: Sequence[QuadraticProgram] | Sequence[Answer], part: str) -> Array:
-    return np.array([getattr(owner, part) for owner in owners])
+    parts = list(map(attrgetter(part), owners))
+    return np.concatenate(parts).reshape(len(parts), *np.shape(parts[0]))
 
 
 def structure(program: QuadraticProgram, answer: Answer) -> tuple[object, ...]:

@@ -96,8 +96,10 @@ def test_the_nearest_point_of_a_path_is_the_least_over_its_pieces(seed: int) -> 
     asked = points[random.integers(0, count, 20)] + random.choice([0, 1e-3, 0.1]) * random.normal(
         size=(20, d)
     )
-    every = np.broadcast_to(np.arange(count - 1), (20, count - 1))
-    _, squares = path.feet(asked[:, None], every)
+    away, lengths = asked[:, None] - points[:-1], np.sqrt(path.squares)
+    directions = path.pieces / np.where(lengths > 0, lengths, 1.0)[:, None]
+    along = np.minimum(np.maximum(np.einsum("ijk,jk->ij", away, directions), 0.0), lengths)
+    squares = np.sum((away - along[..., None] * directions) ** 2, axis=2)
     distances, pieces, shares = path.nearest(asked)
     np.testing.assert_allclose(distances, np.sqrt(squares.min(axis=1)), atol=1e-12)
     feet = points[pieces] + shares[:, None] * path.pieces[pieces]

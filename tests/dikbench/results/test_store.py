@@ -199,7 +199,7 @@ def failed_in(undisturbed: Path, folder: Path) -> None:
     """Copy the results, with the first trial as one that failed."""
     shutil.copytree(undisturbed, folder, dirs_exist_ok=True)
     with Store(folder / "results.sqlite") as store:
-        store.record_trial({**first_row(store), "status": "timeout"}, 1, 0)
+        store.record_trials([({**first_row(store), "status": "timeout"}, 0)], 1)
 
 
 def test_what_is_run_again_has_a_new_row_in_place_of_the_old(
@@ -210,6 +210,30 @@ def test_what_is_run_again_has_a_new_row_in_place_of_the_old(
     run_here(STUDY, tmp_path, RunSettings(jobs=1, rerun="failed"), "second")
     assert list(load_results(tmp_path).trials["run"]) == [2, 1, 1, 1, 1, 1]
     pd.testing.assert_frame_equal(table(tmp_path), table(undisturbed), check_exact=True)
+
+
+def test_rows_that_are_committed_together_are_kept_all_or_none(
+    undisturbed: Path, tmp_path: Path
+) -> None:
+    """The second of two rows is none that the table takes: the first is not kept either."""
+    shutil.copy(undisturbed / "results.sqlite", tmp_path)
+    with Store(tmp_path / "results.sqlite") as store:
+        before, row = store.statuses(), first_row(store)
+        new = [{**row, "id": name} for name in ("first", "second")]
+        with pytest.raises(DikbenchError, match="NOT NULL"):
+            store.record_trials([(new[0], 0), ({**new[1], "steps": None}, 1)], 1)
+        assert store.statuses() == before
+        store.record_trials([(new[0], 0), (new[1], 1)], 1)
+        assert store.statuses() == {**before, "first": row["status"], "second": row["status"]}
+
+
+def test_each_description_of_a_process_is_stored_once(tmp_path: Path) -> None:
+    """Whatever the order in which they come, also an empty one."""
+    with Store(tmp_path / "results.sqlite") as store:
+        names = [store.environment({"a": n} if n else {}) for n in (0, 1, 1, 0, 2, 1)]
+        assert names == [names[0], names[1], names[1], names[0], names[4], names[1]]
+        assert len(set(names)) == 3
+        assert "" not in names
 
 
 def test_rerun_of_what_is_not_there_is_one_line(tmp_path: Path) -> None:
@@ -293,7 +317,7 @@ def test_a_store_that_is_harmed_under_the_run_is_noticed(
             copy.write_bytes(target.read_bytes())
             copy.replace(target)
         with pytest.raises(DikbenchError, match=r"was removed|was replaced or cut"):
-            store.record_trial(row, 1, 0)
+            store.record_trials([(row, 0)], 1)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="nothing is read-only for root")

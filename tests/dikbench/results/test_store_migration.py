@@ -26,7 +26,7 @@ def test_columns_of_earlier_versions_have_the_names_of_today(tmp_path: Path, sch
     """Values move with their names; those of measures that mean something else now are emptied."""
     path = tmp_path / "results.sqlite"
     with Store(path) as store:
-        store.record_trial(ROW, 1, 0)
+        store.record_trials([(ROW, 0)], 1)
         times = {"id": "a", **dict.fromkeys(TIMED, "x"), "formulation_time_median_us": 7.0}
         store.record_times(times, 1)
     with sqlite3.connect(path) as database:
