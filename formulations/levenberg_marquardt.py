@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from dikbench.problem import (
     DikProblem,
     Drawn,
     Parameters,
+    ProblemPart,
     Range,
     Solve,
     damped_least_squares,
@@ -40,6 +41,8 @@ class LevenbergMarquardt(Parameters):
 
     error_factor: Annotated[float, Range(0.0), Drawn(1e-2, 100.0, log=True)] = 1.0
     damping: Annotated[float, Range(0.0), Drawn(1e-4, 0.1, log=True)] = 0.01
+
+    sees: ClassVar[frozenset[ProblemPart]] = frozenset({"weights"})
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
