@@ -155,7 +155,7 @@ class Motion:
         apart = np.zeros((2, self.trace.steps + 1))
         for held in self.scenario.held_frames:
             X = placements(self.scenario.robot, held.frame, self.trace.q)
-            away = held.embedding.points(X[:, :3, :3], X[:, :3, 3]) - held.target
+            away = held.away(X[:, :3, :3], X[:, :3, 3])
             ways = np.diff(away, axis=0)
             squares = np.einsum("ij,ij->i", ways, ways)
             along = np.einsum("ij,ij->i", -away[:-1], ways)

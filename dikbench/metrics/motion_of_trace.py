@@ -37,6 +37,8 @@ def motion_of(trace: Trace, scenario: Scenario, jacobians: Array | None = None) 
         kinematics.update(q)
         J[k] = kinematics.task_jacobian(rows)
     target_rotations, target_translations = _targets(trace, scenario)
+    made = X[:, :3, :3], X[:, :3, 3]
+    points, at = scenario.points_at(trace.tau, made, (target_rotations, target_translations))
     position, orientation = _errors(scenario, X, target_rotations, target_translations)
     return Motion(
         trace=trace,
@@ -45,8 +47,8 @@ def motion_of(trace: Trace, scenario: Scenario, jacobians: Array | None = None) 
         position_error=position,
         orientation_error=orientation,
         jacobians=J,
-        points=scenario.embedding.points(X[:, :3, :3], X[:, :3, 3]),
-        target_points=scenario.embedding.points(target_rotations, target_translations),
+        points=points,
+        target_points=at,
     )
 
 
