@@ -92,6 +92,7 @@ def test_a_run_is_judged_by_its_own_error(rows: str, mode: ReferenceMode) -> Non
     lengths = np.linalg.norm(errors, axis=1)
     np.testing.assert_allclose(motion.tracking_error, lengths, atol=1e-6)
     assert motion.contour_error_6d.max() <= lengths.max() + 1e-6
+    assert motion.contour_error.max() <= motion.position_error.max() + 1e-6
     assert case.feasible == "time"
     along = motion.along_path
     assert along is not None
