@@ -23,7 +23,6 @@ SHORTEST: Final = 1e-12
 FRAME_TASKS: Final = (PoseTask, PositionTask, OrientationTask)
 """The tasks that are about the placement of a frame."""
 
-
 Placements = tuple[Array, Array]
 """Rotations (n, 3, 3) and translations (n, 3) [m]."""
 

@@ -22,6 +22,7 @@ from dikbench.problem.problem import (
     refusal_of,
     sees_lower_tasks,
     sees_weights,
+    sight_of,
 )
 from dikbench.problem.progress import STUCK_PROGRESS, progress, row_weights
 from dikbench.problem.tasks import LinearizedTask, PoseTask, Task
@@ -177,9 +178,10 @@ def _rank(what: str, task: LinearizedTask, weight: Any, priority: object) -> Non
 def _unseen(formulation: Formulation, problem: DikProblem) -> str:
     """Why some of what is given would be ignored; empty where nothing is."""
     if sees_lower_tasks(formulation, problem) is False:
+        but = "but postures " if "postures" in sight_of(formulation) else ""
         return (
-            "does not look at tasks below the first priority, or not at all kinds, such as one of "
-            f"{problem.tasks[-1].priority} here; leave them out, or take a formulation that sees "
+            f"does not look at tasks {but}below the first priority, such as one of priority "
+            f"{problem.tasks[-1].priority}; leave them out, or take a formulation that sees "
             "'lower-tasks'"
         )
     if sees_weights(formulation, problem) is False:
