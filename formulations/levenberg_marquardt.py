@@ -12,6 +12,7 @@ from dikbench.problem import (
     DikProblem,
     Drawn,
     Parameters,
+    ProblemPart,
     Range,
     Solve,
     damped_least_squares,
@@ -43,6 +44,7 @@ class LevenbergMarquardt(Parameters):
     damping: Annotated[float, Range(0.0), Drawn(1e-4, 0.1, log=True)] = 0.01
 
     batched: ClassVar[bool] = True
+    sees: ClassVar[frozenset[ProblemPart]] = frozenset({"weights"})
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

@@ -53,7 +53,7 @@ class WeightedQp(Parameters):
     keeps: ClassVar[frozenset[LimitKind]] = frozenset(
         {"position", "velocity", "acceleration", "inequalities"}
     )
-    sees: ClassVar[frozenset[ProblemPart]] = frozenset({"lower-tasks"})
+    sees: ClassVar[frozenset[ProblemPart]] = frozenset({"lower-tasks", "weights"})
 
     @property
     def batched(self) -> bool:

@@ -8,6 +8,7 @@ from operator import attrgetter
 from typing import Final, Literal, Protocol, runtime_checkable
 
 import msgspec
+import numpy as np
 
 from dikbench.arrays import Array, Indices
 from dikbench.problem.tasks.task import LinearizedJointTask, LinearizedTask, stacked
@@ -19,9 +20,10 @@ from dikbench.robots.robot import Robot
 
 LimitKind = Literal["position", "velocity", "acceleration", "inequalities"]
 
-ProblemPart = Literal["inequalities", "postures", "lower-tasks"]
+ProblemPart = Literal["inequalities", "postures", "lower-tasks", "weights"]
 """What a formulation may see of a problem in addition to the tasks of first priority, which all do:
-the rows G v <= h; joint tasks below the first priority; all tasks below it."""
+the rows G v <= h; joint tasks below the first priority; all tasks below it; the weights of tasks
+and rows."""
 
 _PRIORITY: Final = attrgetter("priority")
 
@@ -184,3 +186,15 @@ def sees_lower_tasks(formulation: Formulation, problem: DikProblem) -> bool | No
     seen = sight_of(formulation)
     joints = all(isinstance(task, LinearizedJointTask) for task in lower)
     return "lower-tasks" in seen or (joints and "postures" in seen)
+
+
+def sees_weights(formulation: Formulation, problem: DikProblem) -> bool | None:
+    """Whether the formulation sees the weights; None where there are none to see.
+
+    Those are, of the first priority, all but 1 (one number for all of it counts against a damping),
+    and below it those that differ within a priority.
+    """
+    first, *lower = problem.levels
+    if np.all(np.equal(first.weight, 1.0)) and not any(np.ptp(level.weight) for level in lower):
+        return None
+    return "weights" in sight_of(formulation)
