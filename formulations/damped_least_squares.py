@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from dikbench.problem import (
     Array,
@@ -32,6 +32,8 @@ class DampedLeastSquares(Parameters):
     """
 
     damping: Annotated[float, Range(0.0), Drawn(1e-3, 0.3, log=True)] = 0.05
+
+    batched: ClassVar[bool] = True
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

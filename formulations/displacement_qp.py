@@ -47,7 +47,7 @@ class DisplacementQp(Parameters):
 
     program: ClassVar[ProgramKind] = "qp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"position", "velocity", "acceleration"})
-    sees: ClassVar[frozenset[ProblemPart]] = frozenset({"lower-tasks"})
+    sees: ClassVar[frozenset[ProblemPart]] = frozenset({"lower-tasks", "weights"})
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

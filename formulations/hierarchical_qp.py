@@ -67,7 +67,7 @@ class HierarchicalQp(Parameters):
     keeps: ClassVar[frozenset[LimitKind]] = frozenset(
         {"position", "velocity", "acceleration", "inequalities"}
     )
-    sees: ClassVar[frozenset[ProblemPart]] = frozenset({"lower-tasks"})
+    sees: ClassVar[frozenset[ProblemPart]] = frozenset({"lower-tasks", "weights"})
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

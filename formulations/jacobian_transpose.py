@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 
-from dikbench.problem import Array, DikProblem, Parameters, Range, Solve
+from dikbench.problem import (
+    Array,
+    DikProblem,
+    Parameters,
+    Range,
+    Solve,
+    divided,
+    dot,
+    times,
+    transposed,
+)
 
 
 @dataclass(frozen=True)
@@ -30,18 +40,17 @@ class JacobianTranspose(Parameters):
 
     rank_tolerance: Annotated[float, Range(above=0.0)] = 1e-6
 
+    batched: ClassVar[bool] = True
+
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
         task = problem.primary
         J, V = task.J, task.V
-        largest = float(np.abs(V).max())
-        if largest == 0:
-            return np.zeros(J.shape[1])
-        direction = V / largest  # its squares neither underflow nor overflow
-        g = direction.dot(J)
-        steepness = float(g.dot(g))
-        if steepness <= self.rank_tolerance**2 * float(direction.dot(direction)):
-            return np.zeros(J.shape[1])
-        motion = J.dot(g)
-        v: Array = g * (largest * steepness / float(motion.dot(motion)))
-        return v
+        largest = np.abs(V).max(axis=-1)
+        direction = V / np.where(largest == 0, 1.0, largest)[..., None]  # its squares do not vanish
+        g = times(transposed(J), direction)
+        steepness = dot(g, g)
+        lost = steepness <= self.rank_tolerance**2 * dot(direction, direction)
+        motion = times(J, g)
+        length = divided(largest * steepness, dot(motion, motion), ~lost)
+        return g * length[..., None]

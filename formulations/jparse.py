@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 
-from dikbench.problem import Array, DikProblem, Drawn, Parameters, Range, Solve, thin_svd
+from dikbench.problem import (
+    Array,
+    DikProblem,
+    Drawn,
+    Parameters,
+    Range,
+    Solve,
+    by_singular_values,
+    divided,
+)
 
 
 @dataclass(frozen=True)
@@ -32,12 +41,15 @@ class JParse(Parameters):
 
     threshold: Annotated[float, Range(above=0.0, below=1.0), Drawn(0.01, 0.5, log=True)] = 0.1
 
+    batched: ClassVar[bool] = True
+
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
         task = problem.primary
-        U, sigma, Vt = thin_svd(task.J)
-        if sigma[0] == 0:
-            return np.zeros(Vt.shape[1])
-        safe = np.maximum(sigma, self.threshold * sigma[0])
-        v: Array = (sigma / safe / safe * task.V.dot(U)).dot(Vt)
-        return v
+
+        def shares(sigma: Array, parts: Array) -> Array:
+            safe = np.maximum(sigma, self.threshold * sigma[..., :1])
+            moves = ~(safe <= 0)  # of NaN as well
+            return divided(divided(sigma, safe, moves), safe, moves) * parts
+
+        return by_singular_values(task.J, task.V, shares)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 
@@ -12,9 +12,11 @@ from dikbench.problem import (
     DikProblem,
     Drawn,
     Parameters,
+    ProblemPart,
     Range,
     Solve,
     damped_least_squares,
+    dot,
 )
 
 
@@ -41,10 +43,13 @@ class LevenbergMarquardt(Parameters):
     error_factor: Annotated[float, Range(0.0), Drawn(1e-2, 100.0, log=True)] = 1.0
     damping: Annotated[float, Range(0.0), Drawn(1e-4, 0.1, log=True)] = 0.01
 
+    batched: ClassVar[bool] = True
+    sees: ClassVar[frozenset[ProblemPart]] = frozenset({"weights"})
+
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
         task = problem.primary
         root = np.sqrt(np.broadcast_to(task.weight, task.V.shape))
         error = root * task.error
-        squared = 0.5 * self.error_factor * float(error.dot(error)) + self.damping**2
-        return damped_least_squares(root[:, None] * task.J, root * task.V, squared)
+        squared = 0.5 * self.error_factor * dot(error, error) + self.damping**2
+        return damped_least_squares(root[..., None] * task.J, root * task.V, squared)

@@ -53,19 +53,21 @@ class LpAlpha(Parameters):
         {"position", "velocity", "acceleration", "inequalities"}
     )
 
+    batched: ClassVar[bool] = True
+
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
         task = problem.primary
         rho = regularization_for(task, self.regularization)
         x = solve(alpha_program(task, problem.box(self.braking), rho, problem.G, problem.h))
-        return x[: problem.robot.nv]
+        return x[..., : problem.robot.nv]
 
 
 def regularization_for(task: LinearizedTask, given: float | None) -> float:
     """Return rho: as given, else 1e-4 where the task leaves joints free and 0 elsewhere."""
     if given is not None:
         return given
-    m, n = task.J.shape
+    m, n = task.J.shape[-2:]
     return 1e-4 if n > m else 0.0
 
 
@@ -76,16 +78,19 @@ def alpha_program(
     G: Array | None = None,
     h: Array | None = None,
 ) -> QuadraticProgram:
-    """Pose the program of `LpAlpha` in matrices, in x = (v, alpha), shape (nv + 1,)."""
-    m, n = task.J.shape
+    """Pose the program of `LpAlpha` in matrices, in x = (v, alpha), shape (nv + 1,).
+
+    Of many control steps as well (see `DikProblem`); the cost is the same for all.
+    """
+    *rows, m, n = task.J.shape
     P = np.zeros((n + 1, n + 1))
     P.flat[: n * (n + 2) : n + 2] = regularization
     q = np.zeros(n + 1)
     q[n] = -1.0
-    A = np.empty((m, n + 1))
-    A[:, :n] = task.J
-    A[:, n] = -task.V
-    lower, upper = np.zeros(n + 1), np.ones(n + 1)
-    lower[:n], upper[:n] = box.lower, box.upper
-    rows = None if G is None else np.pad(G, ((0, 0), (0, 1)))
-    return QuadraticProgram(P, q, rows, h, A, np.zeros(m), lower, upper)
+    A = np.empty((*rows, m, n + 1))
+    A[..., :n] = task.J
+    A[..., n] = -task.V
+    lower, upper = np.zeros((*rows, n + 1)), np.ones((*rows, n + 1))
+    lower[..., :n], upper[..., :n] = box.lower, box.upper
+    padded = None if G is None else np.pad(G, ((0, 0), (0, 1)))
+    return QuadraticProgram(P, q, padded, h, A, np.zeros(m), lower, upper)

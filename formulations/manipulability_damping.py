@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
+
+import numpy as np
 
 from dikbench.problem import (
     Array,
@@ -41,8 +43,10 @@ class ManipulabilityDamping(Parameters):
     damping: Annotated[float, Range(0.0), Drawn(1e-3, 0.3, log=True)] = 0.05
     threshold: Annotated[float, Range(above=0.0), Drawn(2e-3, 0.1, log=True)] = 0.02
 
+    batched: ClassVar[bool] = True
+
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
         task = problem.primary
-        damping = self.damping * max(0.0, 1.0 - volume(task.J) / self.threshold)
+        damping = self.damping * np.maximum(0.0, 1.0 - volume(task.J) / self.threshold)
         return damped_least_squares(task.J, task.V, damping**2)

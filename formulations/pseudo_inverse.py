@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 
@@ -46,6 +46,8 @@ class PseudoInverse(Parameters):
         """The velocity limits, unless nothing is done after the inverse."""
         return frozenset() if self.after == "none" else frozenset({"velocity"})
 
+    batched: ClassVar[bool] = True
+
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
         task = problem.primary
@@ -57,5 +59,6 @@ class PseudoInverse(Parameters):
 
 
 def scaled(v: Array, limit: Interval) -> Array:
-    """Scale v (nv,) by the largest s <= 1 that keeps it inside the limits."""
-    return v / max(1.0, float(limit.usage(v).max()))
+    """Scale v (nv,), or each of (N, nv), by the largest s <= 1 that keeps it inside the limits."""
+    shorter: Array = v / np.maximum(1.0, limit.usage(v).max(axis=-1, keepdims=True))
+    return shorter

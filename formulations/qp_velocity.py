@@ -15,7 +15,10 @@ from dikbench.problem import (
     QuadraticProgram,
     Range,
     Solve,
+    product,
     scaled_identity,
+    times,
+    transposed,
 )
 
 
@@ -40,13 +43,14 @@ class QpVelocity(Parameters):
     program: ClassVar[ProgramKind] = "qp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"velocity"})
 
+    batched: ClassVar[bool] = True
+
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
         J, n = problem.primary.J, problem.robot.nv
-        P = J.T.dot(J) + scaled_identity(n, self.damping**2)
+        Jt = transposed(J)
+        P, q = product(Jt, J) + scaled_identity(n, self.damping**2), -times(Jt, problem.primary.V)
         limit = problem.limits.joint.velocity
         if limit is None:
-            return solve(QuadraticProgram(P, -J.T.dot(problem.primary.V)))
-        return solve(
-            QuadraticProgram(P, -J.T.dot(problem.primary.V), lb=limit.lower, ub=limit.upper)
-        )
+            return solve(QuadraticProgram(P, q))
+        return solve(QuadraticProgram(P, q, lb=limit.lower, ub=limit.upper))

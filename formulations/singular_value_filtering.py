@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from dikbench.errors import DikbenchError
-from dikbench.problem import Array, DikProblem, Drawn, Parameters, Range, Solve, thin_svd
+from dikbench.problem import (
+    Array,
+    DikProblem,
+    Drawn,
+    Parameters,
+    Range,
+    Solve,
+    by_singular_values,
+)
 
 
 @dataclass(frozen=True)
@@ -38,10 +46,13 @@ class SingularValueFiltering(Parameters):
                 f"shape={self.shape} must be between smallest={self.smallest} and 2 / smallest"
             )
 
+    batched: ClassVar[bool] = True
+
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
         task = problem.primary
-        U, sigma, Vt = thin_svd(task.J)
-        filtered = sigma + 2 * self.smallest / ((sigma + self.shape) * sigma + 2)
-        v: Array = (task.V.dot(U) / filtered).dot(Vt)
-        return v
+
+        def shares(sigma: Array, parts: Array) -> Array:
+            return parts / (sigma + 2 * self.smallest / ((sigma + self.shape) * sigma + 2))
+
+        return by_singular_values(task.J, task.V, shares)

@@ -3,9 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
-from dikbench.problem import Array, DikProblem, Drawn, Parameters, Range, Solve, rank, thin_svd
+from dikbench.problem import (
+    Array,
+    DikProblem,
+    Drawn,
+    Parameters,
+    Range,
+    Solve,
+    by_singular_values,
+    divided,
+)
 
 
 @dataclass(frozen=True)
@@ -28,10 +37,14 @@ class TruncatedSvd(Parameters):
 
     relative_tolerance: Annotated[float, Range(0.0, below=1.0), Drawn(1e-3, 0.2, log=True)] = 0.01
 
+    batched: ClassVar[bool] = True
+
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
         task = problem.primary
-        U, sigma, Vt = thin_svd(task.J)
-        k = rank(sigma, self.relative_tolerance * float(sigma[0]))
-        v: Array = (task.V.dot(U[:, :k]) / sigma[:k]).dot(Vt[:k])
-        return v
+
+        def shares(sigma: Array, parts: Array) -> Array:
+            lost = sigma <= self.relative_tolerance * sigma[..., :1]
+            return divided(parts, sigma, ~lost)
+
+        return by_singular_values(task.J, task.V, shares)

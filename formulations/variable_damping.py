@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 
-from dikbench.problem import Array, DikProblem, Drawn, Parameters, Range, Solve, thin_svd
+from dikbench.problem import (
+    Array,
+    DikProblem,
+    Drawn,
+    Parameters,
+    Range,
+    Solve,
+    by_singular_values,
+    divided,
+)
 
 
 @dataclass(frozen=True)
@@ -41,16 +50,17 @@ class VariableDamping(Parameters):
     filtering: Literal["numerical", "isotropic"] = "numerical"
     rank_tolerance: Annotated[float, Range(0.0)] = 1e-6
 
+    batched: ClassVar[bool] = True
+
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
         task = problem.primary
-        U, sigma, Vt = thin_svd(task.J)
-        squares = sigma**2 + self.isotropic_damping**2
-        nearness = 1.0 - (sigma[-1] / self.threshold) ** 2
-        if nearness > 0:
+
+        def shares(sigma: Array, parts: Array) -> Array:
+            squares = sigma**2 + self.isotropic_damping**2
+            nearness = np.maximum(0.0, 1.0 - (sigma[..., -1:] / self.threshold) ** 2)
             damped = slice(-1, None) if self.filtering == "numerical" else slice(None)
-            squares[damped] += nearness * self.damping**2
-        gains = np.zeros_like(sigma)
-        np.divide(sigma, squares, out=gains, where=squares > self.rank_tolerance**2)
-        v: Array = (gains * task.V.dot(U)).dot(Vt)
-        return v
+            squares[..., damped] += nearness * self.damping**2
+            return divided(sigma, squares, ~(squares <= self.rank_tolerance**2)) * parts
+
+        return by_singular_values(task.J, task.V, shares)

@@ -53,7 +53,12 @@ class WeightedQp(Parameters):
     keeps: ClassVar[frozenset[LimitKind]] = frozenset(
         {"position", "velocity", "acceleration", "inequalities"}
     )
-    sees: ClassVar[frozenset[ProblemPart]] = frozenset({"lower-tasks"})
+    sees: ClassVar[frozenset[ProblemPart]] = frozenset({"lower-tasks", "weights"})
+
+    @property
+    def batched(self) -> bool:
+        """Without the derivative of the logarithm, which is computed for one placement."""
+        return not self.log_derivative
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

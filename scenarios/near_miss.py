@@ -119,7 +119,10 @@ class NearMiss(Family):
         motion = passage.motion
         # At a fold the smallest singular value is about the root of the distance.
         near = self.miss <= NEAR_SINGULARITY or motion.sigma_min.min() < NEAR_SINGULARITY
-        singular = near and motion.peak_speed_ratio > SINGULAR_NEED
+        limit = robot.limits.velocity
+        unlimited = limit is None or bool(np.isinf(limit.upper[robot.chain]).all())
+        # Without speed limits no need can be measured, and the distance alone counts.
+        singular = near and (unlimited or motion.peak_speed_ratio > SINGULAR_NEED)
         return Case(
             passage.reference,
             motion.q[0],

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 import pinocchio as pin
 
+from dikbench.errors import DikbenchError
 from dikbench.problem import Array, Drawn, Range, Robot
 from dikbench.scenario import (
     Case,
@@ -24,6 +25,9 @@ from dikbench.scenario import (
 
 LEG_DURATION_SHARES = (0.2, 0.1, 0.05, 0.1, 0.3, 0.1, 0.05, 0.1)
 """Approach, down, grasp (a dwell), lift, carry, down, release (a dwell), up."""
+
+REMEDY = "a smaller width=, height= or turn= asks for less"
+"""What a user can change where the arm cannot do it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,11 +67,14 @@ class PickAndPlace(Family):
         check_can_lift(robot, self.robots)
         q0 = change.posture(robot, robot.q0)
         places = self._places(placement_of(robot, q0), change.rotation(robot))
-        duration = duration_at(robot, _path(places, 1.0), q0, self.speed, self.dt)
-        reference = _path(places, duration)
-        motion = self.exact_motion(robot, reference, q0)
+        try:
+            duration = duration_at(robot, _path(places, 1.0), q0, self.speed, self.dt)
+            reference = _path(places, duration)
+            motion = self.exact_motion(robot, reference, q0)
+        except DikbenchError as error:
+            raise DikbenchError(f"{error} ({REMEDY})") from None
         speed = (0.95 * self.speed, 1.05 * self.speed)
-        claims = usual_claims(motion, speed=speed, sigma_min=0.03, margin=0.1)
+        claims = usual_claims(motion, speed=speed, sigma_min=0.03, margin=0.1, remedy=REMEDY)
         return Case(reference, q0, motion, claims)
 
     def _places(self, start: Any, rotation: Array) -> list[Any]:

@@ -39,6 +39,9 @@ POSITION_MARGIN_RAD = 0.02
 MOST_STEPS = 500
 """Steps along the line, at most 10 m, after which nothing ends it."""
 
+REMEDY = "the line is another one with another frame=, rows= or seed"
+"""What a user can change where the line is not one to the edge of the reach."""
+
 LARGEST_JOINT_STEP_RAD = 0.6
 """A solution that is farther away belongs to another branch."""
 
@@ -98,7 +101,7 @@ class WorkspaceBoundary(Family):
         asked = robot.reach_of(reference.placement(reference.duration / 2))
         sigma = motion.sigma_min
         claims = (
-            Claim("reach along the line [m]", reach, at_least=1.05 * first),
+            Claim("reach along the line [m]", reach, at_least=1.05 * first, remedy=REMEDY),
             Claim("farthest target over the reach", asked / reach, at_least=1 - 1e-9),
             Claim("singular value at the boundary (m, rad)", sigma[-1], at_most=0.02),
             Claim("its ratio to the one at the start", sigma[-1] / sigma[0], at_most=0.1),
@@ -106,6 +109,7 @@ class WorkspaceBoundary(Family):
                 "position margin up to there [rad]",
                 motion.margin.min(),
                 at_least=POSITION_MARGIN_RAD,
+                remedy=REMEDY,
             ),
         )
         return Case(
@@ -142,12 +146,12 @@ def _as_far_as_it_goes(
         if position_margin(arm, further) < POSITION_MARGIN_RAD:
             raise DikbenchError(
                 f"along the line from its start robot {arm.name} meets a joint limit at "
-                f"{distance:.3g} m, not the edge of its reach"
+                f"{distance:.3g} m, not the edge of its reach ({REMEDY})"
             )
         if len(q) > MOST_STEPS:
             raise DikbenchError(
                 f"nothing ends the reach of robot {arm.name} along the line from its start: it "
-                f"still follows at {distance:.3g} m"
+                f"still follows at {distance:.3g} m ({REMEDY})"
             )
     return measure_motion(arm, np.arange(len(q), dtype=float), np.array(q))
 

@@ -66,11 +66,13 @@ def description(text: str) -> str:
     if name in PLANTS:
         make_plant(selector)
         return _plugin(plant_plugin(name), selector, "")
+    if name in ROBOTS or name.endswith(ROBOT_FILES):
+        return robot_in_words(name, selector.parameters)
     described = _without_parameters(name)
     if selector.parameters:
         raise DikbenchError(
             f"{text}: {name} has no parameters; valid in brackets: those of a formulation, "
-            "scenario, solver or plant"
+            "scenario, solver, plant or robot"
         )
     return described
 
@@ -78,8 +80,6 @@ def description(text: str) -> str:
 def _without_parameters(name: str) -> str:
     if name in ORACLES:
         return f"{name}: {ORACLE_SUMMARIES[name]}"
-    if name in ROBOTS or name.endswith(ROBOT_FILES):
-        return robot_in_words(name)
     if name in METRICS:
         return _metric(name)
     if name in {outcome.value for outcome in Outcome}:

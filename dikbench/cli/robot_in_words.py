@@ -3,38 +3,61 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Mapping
 from typing import Any, Final
 from xml.etree import ElementTree
 
 import numpy as np
 
 from dikbench.arrays import Array
+from dikbench.errors import unknown
 from dikbench.robots.catalogue import ROBOTS
 from dikbench.robots.limits import Interval
 from dikbench.robots.loading import load_robot
 from dikbench.robots.robot import Robot
+from dikbench.robots.task_rows import rows_in_words
 
-ROBOT_FILES: Final = (".urdf", ".xml")
+ROBOT_FILES: Final = (".urdf", ".xml", ".xacro")
 """How the name of a robot's file ends."""
+
+OPTIONS: Final = ("frame", "rows", "lock", "root", "velocity", "acceleration")
+"""What of a robot can be given in brackets (see `load_robot`), as for a family."""
 
 WIDTH: Final = 100
 """Characters of a line of frames."""
 
 
-def robot_in_words(name_or_urdf: str) -> str:
+def robot_in_words(name_or_urdf: str, options: Mapping[str, str]) -> str:
     """Describe a robot of the catalogue or of a URDF file.
 
+    Args:
+        name_or_urdf: the robot.
+        options: of `load_robot`, by name (`OPTIONS`).
+
     Raises:
-        DikbenchError: if there is no such robot, or its file cannot be read.
+        DikbenchError: if there is no such robot or option, or its file cannot be read.
     """
+    for name in options:
+        if name not in OPTIONS:
+            raise unknown(f"parameter of robot {name_or_urdf}", name, OPTIONS)
+    given: dict[str, Any] = dict(options)
     if name_or_urdf in ROBOTS:
-        robot, entry = load_robot(name_or_urdf), ROBOTS[name_or_urdf]
+        robot, entry = load_robot(name_or_urdf, **given), ROBOTS[name_or_urdf]
         head = [f"{name_or_urdf}: {entry.summary}", f"  task frame: {robot.frame}"]
         source = entry.acceleration_source
     else:
-        robot = load_robot(name_or_urdf, _last_moved_link(name_or_urdf))
-        head = [f"{name_or_urdf}: a robot from a URDF; name its task frame with frame=..."]
+        given.setdefault("frame", _last_moved_link(name_or_urdf))
+        robot = load_robot(name_or_urdf, **given)
+        named = f"task frame {robot.frame}"
+        named = named if "frame" in options else "name its task frame with frame=..."
+        head = [f"{name_or_urdf}: a robot from a URDF; {named}"]
         source = "a URDF has none"
+    if "acceleration" in options:
+        source = "given by hand"
+    if options:
+        asked = rows_in_words(robot.task_rows, robot.task_axes)
+        moved = rows_in_words(robot.movable_rows, "body")
+        head.append(f"  asked for: rows={asked}; its {len(robot.chain)} joints move {moved}")
     known = robot.available_acceleration is not None
     return "\n".join(
         [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
@@ -172,13 +172,17 @@ class Motion:
     def contour_error(self) -> Array:
         """Distance of the task frame from the path of the reference, (n + 1,) [m].
 
-        The nearest point of the whole path counts, whatever its nominal time. Without a path it is
-        the distance from the target. NaN where the task is about the
-        orientation only.
+        The nearest point of the whole path counts, whatever its nominal time, in the rows that are
+        asked for. Without a path it is the distance from the target. NaN where the task is about
+        the orientation only.
         """
-        path = self.scenario.path
-        if path is None or np.isnan(self.position_error[0]):
+        scenario = self.scenario
+        path, embedded = scenario.path, scenario.embedded_path
+        if path is None or embedded is None or np.isnan(self.position_error[0]):
             return self.position_error
+        if 2 in scenario.robot.movable_rows and not {0, 1, 2} <= {*scenario.rows}:
+            k = len(scenario.embedding.linear)
+            return replace(embedded, points=embedded.points[:, :k]).nearest(self.points[:, :k])[0]
         return path.distances(self.translations)
 
     @_by_rows
@@ -250,7 +254,7 @@ class Motion:
         apart = np.zeros((2, self.trace.steps + 1))
         for held in self.scenario.held_frames:
             X = placements(self.scenario.robot, held.frame, self.trace.q)
-            away = held.embedding.points(X[:, :3, :3], X[:, :3, 3]) - held.target
+            away = held.away(X[:, :3, :3], X[:, :3, 3])
             ways = np.diff(away, axis=0)
             squares = np.einsum("ij,ij->i", ways, ways)
             along = np.einsum("ij,ij->i", -away[:-1], ways)

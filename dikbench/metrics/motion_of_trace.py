@@ -87,12 +87,15 @@ def _motion(
     target_translations: Array,
 ) -> Motion:
     """Compute a motion; the Jacobians (n + 1, m, nv) that are missing are written into J."""
-    robot, embedding, rows = scenario.robot, scenario.embedding, np.array(scenario.rows)
+    robot, rows = scenario.robot, np.array(scenario.rows)
     kinematics = Kinematics(robot, robot.scratch)
     for k in missing.tolist():
         kinematics.update(trace.q[k])
         J[k] = kinematics.task_jacobian(rows)
     X = placements(robot, robot.frame_id, trace.q)
+    made = X[:, :3, :3], X[:, :3, 3]
+    targets = target_rotations, target_translations
+    points, target_points = scenario.points_at(trace.tau, made, targets)
     position, orientation = _errors(scenario, X, target_rotations, target_translations)
     return Motion(
         trace=trace,
@@ -101,8 +104,8 @@ def _motion(
         position_error=position,
         orientation_error=orientation,
         jacobians=J,
-        points=embedding.points(X[:, :3, :3], X[:, :3, 3]),
-        target_points=embedding.points(target_rotations, target_translations),
+        points=points,
+        target_points=target_points,
     )
 
 

@@ -8,8 +8,9 @@ from operator import attrgetter
 from typing import Final, Literal, Protocol, runtime_checkable
 
 import msgspec
+import numpy as np
 
-from dikbench.arrays import Array
+from dikbench.arrays import Array, Indices
 from dikbench.problem.tasks.task import LinearizedJointTask, LinearizedTask, stacked
 from dikbench.problem.velocity_box import Box, Braking, velocity_box
 from dikbench.programs.modelled_program import ModelledProgram
@@ -19,15 +20,20 @@ from dikbench.robots.robot import Robot
 
 LimitKind = Literal["position", "velocity", "acceleration", "inequalities"]
 
-ProblemPart = Literal["inequalities", "postures", "lower-tasks"]
+ProblemPart = Literal["inequalities", "postures", "lower-tasks", "weights"]
 """What a formulation may see of a problem in addition to the tasks of first priority, which all do:
-the rows G v <= h; joint tasks below the first priority; all tasks below it."""
+the rows G v <= h; joint tasks below the first priority; all tasks below it; the weights of tasks
+and rows."""
 
 _PRIORITY: Final = attrgetter("priority")
 
 
 class DikProblem(msgspec.Struct, eq=False):
     """One control step: the configuration, the tasks, the limits.
+
+    A formulation that is `batched` (see `Formulation`) is handed N control steps of one robot at
+    once: q, v_prev, the coordinates of the limits, and J, V and the error of each task have an axis
+    of rows in front, (N, nq), (N, m, nv) ...; a posture task's J is the same for all, (nv, nv).
 
     The tasks may be given in any order: they are sorted by priority when the problem is made, and
     those of one priority keep the order in which they were given.
@@ -50,7 +56,7 @@ class DikProblem(msgspec.Struct, eq=False):
     dt: float
     tasks: Sequence[LinearizedTask]
     limits: Limits
-    relaxed: int = 0
+    relaxed: int | Indices = 0
     G: Array | None = None
     h: Array | None = None
     _levels: tuple[LinearizedTask, ...] | None = None
@@ -61,7 +67,8 @@ class DikProblem(msgspec.Struct, eq=False):
         Raises:
             DikbenchError: if a (cos, sin) or a quaternion in q has not norm 1.
         """
-        self.robot.check_norms(self.q, "q")
+        if self.q.ndim == 1:
+            self.robot.check_norms(self.q, "q")
         self.tasks = self._levels = tasks = tuple(self.tasks)
         for first, second in pairwise(tasks):
             if first.priority >= second.priority:
@@ -111,6 +118,11 @@ class Formulation(Protocol):
     none but what it keeps). A method `refuses(problem)` says why it cannot answer problems of this
     kind, and returns an empty text where it can. A paragraph `Source: ...` in its docstring names
     the paper. The same problem gives the same velocity.
+
+    With `batched = True` it says that `velocity` also answers N control steps at once (see
+    `DikProblem`), (N, nv), each as if it were alone: matrices with the functions of
+    `dikbench.problem`, everything else element by element or over the last axis. NaN in a row
+    stands for an answer that it has to be asked for alone.
     """
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
@@ -131,6 +143,11 @@ def program_of(formulation: Formulation) -> ProgramKind | None:
 def promises_of(formulation: Formulation) -> frozenset[LimitKind]:
     """Return the kinds of limits that the formulation promises to keep."""
     return frozenset(getattr(formulation, "keeps", ()))
+
+
+def is_batched(formulation: Formulation) -> bool:
+    """Return whether the formulation answers many control steps at once."""
+    return bool(getattr(formulation, "batched", False))
 
 
 def sight_of(formulation: Formulation) -> frozenset[ProblemPart]:
@@ -169,3 +186,15 @@ def sees_lower_tasks(formulation: Formulation, problem: DikProblem) -> bool | No
     seen = sight_of(formulation)
     joints = all(isinstance(task, LinearizedJointTask) for task in lower)
     return "lower-tasks" in seen or (joints and "postures" in seen)
+
+
+def sees_weights(formulation: Formulation, problem: DikProblem) -> bool | None:
+    """Whether the formulation sees the weights; None where there are none to see.
+
+    Those are, of the first priority, all but 1 (one number for all of it counts against a damping),
+    and below it those that differ within a priority.
+    """
+    first, *lower = problem.levels
+    if np.all(np.equal(first.weight, 1.0)) and not any(np.ptp(level.weight) for level in lower):
+        return None
+    return "weights" in sight_of(formulation)

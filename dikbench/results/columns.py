@@ -18,6 +18,8 @@ SEES: Final[Mapping[str, str]] = MappingProxyType(
         "distances (1, 0; empty where there are none)",
         "sees_lower_tasks": "whether the formulation sees every task below the first priority "
         "(1, 0; empty where there is none)",
+        "sees_weights": "whether the formulation sees the weights of tasks and rows (1, 0; empty "
+        "where all of the first priority are 1 and those of each lower one equal)",
     }
 )
 """Columns of what a formulation sees of a scenario's problems, and what they say."""

@@ -76,7 +76,7 @@ def load_robot(
         if root != "fixed":
             raise DikbenchError(f"robot {text}: root={root} is for a URDF; valid: fixed")
         robot = _named(text)
-    elif text.endswith((".urdf", ".xml")) or "/" in text or os.path.isfile(text):
+    elif text.endswith((".urdf", ".xml", ".xacro")) or "/" in text or os.path.isfile(text):
         robot = _from_urdf(text, frame, root)
     else:
         raise unknown("robot", text, ROBOTS, "(or give the path of a .urdf file)")

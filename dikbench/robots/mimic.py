@@ -101,6 +101,11 @@ def with_followers(
 ) -> JointLimits:
     """Narrow the position and velocity limits of joints by those of the joints that follow them.
 
+    Effort limits stay the joint's own. By the balance of power its torque is tau + m tau_f, with m
+    the multiplier and tau_f the follower's: a follower with a motor of its own would widen the
+    limit by |m| times its own, one that a linkage drives says nothing, and a URDF does not tell
+    which it is.
+
     Args:
         limits: the limits of the model's free joints.
         model: the Pinocchio model.

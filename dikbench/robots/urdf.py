@@ -25,6 +25,9 @@ ROOT_JOINTS: Final[Mapping[str, Callable[[], Any]]] = MappingProxyType(
 MOVING: Final = ("revolute", "continuous", "prismatic")
 """Types of joints with one coordinate, or (cos, sin)."""
 
+XACRO: Final = "/xacro}"
+"""The end of the namespace of xacro's elements."""
+
 SHORTEST_AXIS: Final = 1e-9
 """An axis whose vector is shorter has no direction."""
 
@@ -43,6 +46,10 @@ def urdf_model(path: str, root: Root = "fixed") -> tuple[Any, list[UrdfJoint]]:
     if root not in get_args(Root):
         raise unknown("root", root, get_args(Root))
     document = _document(path)
+    if any(XACRO in element.tag for element in document.iter()):
+        raise DikbenchError(
+            f"robot file {path} is a xacro file; run `xacro {path} > robot.urdf` and give that"
+        )
     elements = {element.get("name", ""): element for element in document.findall("joint")}
     try:
         joints = [_joint(e) for e in elements.values() if e.get("type") in MOVING]

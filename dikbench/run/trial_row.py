@@ -18,6 +18,7 @@ from dikbench.problem.problem import (
     refusal_of,
     sees_constraints,
     sees_lower_tasks,
+    sees_weights,
 )
 from dikbench.robots.kinematics import Kinematics
 from dikbench.run.provenance import environment
@@ -142,6 +143,7 @@ def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "al
     sight = {
         "sees_constraints": None if oracle else sees_constraints(formulation, problem),
         "sees_lower_tasks": None if oracle else sees_lower_tasks(formulation, problem),
+        "sees_weights": None if oracle else sees_weights(formulation, problem),
     }
     if reason:
         row = {**row_without_run(trial, Status.SKIPPED, reason), **sight}

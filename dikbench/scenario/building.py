@@ -200,6 +200,7 @@ def usual_claims(
     speed: tuple[float, float] | None = None,
     sigma_min: float | None = None,
     margin: float | None = None,
+    remedy: str = "",
 ) -> tuple[Claim, ...]:
     """Make the usual claims about the exact motion; what is None is left out.
 
@@ -208,15 +209,16 @@ def usual_claims(
         speed: bounds on the peak of the joint speeds over their limits.
         sigma_min: lower bound on the smallest singular value of the task Jacobian (m, rad).
         margin: lower bound on the distance to a position limit [rad].
+        remedy: what to change where the last two do not hold.
     """
     claims = []
     if speed is not None:
         claims.append(Claim("required speed over limit", motion.peak_speed_ratio, *speed))
     if sigma_min is not None:
         sigma = motion.sigma_min.min()
-        claims.append(Claim("smallest singular value (m, rad)", sigma, sigma_min))
+        claims.append(Claim("smallest singular value (m, rad)", sigma, sigma_min, remedy=remedy))
     if margin is not None:
-        claims.append(Claim("position margin [rad]", motion.margin.min(), margin))
+        claims.append(Claim("position margin [rad]", motion.margin.min(), margin, remedy=remedy))
     return tuple(claims)
 
 

@@ -15,12 +15,14 @@ class Claim:
         quantity: what was measured, with its unit.
         value: the measured value.
         at_least, at_most: the range of the value.
+        remedy: what to change where it does not hold, for the message.
     """
 
     quantity: str
     value: float
     at_least: float = -float("inf")
     at_most: float = float("inf")
+    remedy: str = ""
 
     @property
     def holds(self) -> bool:
@@ -39,7 +41,8 @@ class Claim:
         low = f">= {self.at_least:.4g}" if self.at_least > -float("inf") else ""
         high = f"<= {self.at_most:.4g}" if self.at_most < float("inf") else ""
         valid = " and ".join(filter(None, (low, high))) or "a number"
-        return f"{self.quantity} = {self.value:.4g}, must be {valid}"
+        remedy = f" ({self.remedy})" if self.remedy else ""
+        return f"{self.quantity} = {self.value:.4g}, must be {valid}{remedy}"
 
 
 class CertificateFailed(DikbenchError):

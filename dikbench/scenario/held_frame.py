@@ -20,12 +20,26 @@ class HeldFrame:
     Attributes:
         frame: Pinocchio's index of it.
         embedding: of its task.
-        target: the point of the embedding where it is to be, (d,) [m].
+        rotation: of the target, (3, 3).
+        translation: of the target, (3,) [m].
     """
 
     frame: int
     embedding: Embedding
-    target: Array
+    rotation: Array
+    translation: Array
+
+    def away(self, rotations: Array, translations: Array) -> Array:
+        """Compute how far placements are from the target, vectors in points' space (n, d) [m].
+
+        Args:
+            rotations: (n, 3, 3).
+            translations: (n, 3) [m].
+        """
+        n = len(rotations)
+        targets = self.rotation[None].repeat(n, 0), self.translation[None].repeat(n, 0)
+        at = self.embedding.points(self.rotation[None], self.translation[None])
+        return self.embedding.beside((rotations, translations), targets) - at
 
 
 def held_frames(
@@ -38,9 +52,8 @@ def held_frames(
             continue
         rotation, translation = _parts(task.target)
         embedding = embedding_of(task, robot, rotation)
-        target = embedding.points(rotation[None], translation[None])[0]
         index = robot.frame_id if task.frame is None else frame_id(robot.model, task.frame)
-        held.append(HeldFrame(index, embedding, target))
+        held.append(HeldFrame(index, embedding, rotation, translation))
     return tuple(held)
 
 

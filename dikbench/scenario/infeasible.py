@@ -68,6 +68,8 @@ def _asks_for_the_whole_pose(scenario: Scenario) -> bool:
     pose = embedding_of(PoseTask(), scenario.robot, scenario.reference.placement(0.0).rotation)
     asked = scenario.embedding
     parts = ((pose.linear, asked.linear), (pose.left, asked.left), (pose.right, asked.right))
+    if asked.by_error:
+        return False
     return pose.scale == asked.scale and all(np.array_equal(a, b) for a, b in parts)
 
 
@@ -148,7 +150,8 @@ def _branch_leads_out(scenario: Scenario, last: float) -> str:
     chain, rows = robot.chain, scenario.rows
     if motion is None or len(chain) != len(rows) or motion.margin[0] < 0:
         return ""
-    if scenario.embedding.of_one_turn:  # whose points are not linear in the rotation
+    embedding = scenario.embedding
+    if embedding.of_one_turn or embedding.by_error:  # points that are not linear in the rotation
         return ""
     kinematics, worst = Kinematics(robot), (1.0, "", 0)
     unit = FIRST_ORDER_FACTOR * scenario.tolerance_m

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Annotated, Final, NamedTuple
@@ -12,9 +12,10 @@ from typing import Annotated, Final, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from dikbench.arrays import Array, read_only
+from dikbench.arrays import Array, Mask, read_only
 from dikbench.parameters import Parameters, Range
 from dikbench.problem.constraints import CollisionConstraint, TorqueConstraint
+from dikbench.problem.tasks.many_tasks import integrated
 from dikbench.robots.limits import Limits
 from dikbench.scenario.scenario import Scenario
 from dikbench.scenario.violation import Violation, broken_limit, collision
@@ -62,11 +63,11 @@ class Plant(Parameters, ABC):
 
     @abstractmethod
     def drive(self, v: Array, v_before: Array, limits: Limits, dt: float) -> Array:
-        """Compute the velocity that is applied of a command that arrived.
+        """Compute the velocity that is applied of a command that arrived, or of N of them.
 
         Args:
-            v: the command, (nv,) [rad/s or m/s], read-only.
-            v_before: the velocity that was applied before, (nv,) [rad/s or m/s], read-only.
+            v: the command, (nv,) or (N, nv) [rad/s or m/s], read-only.
+            v_before: the velocity that was applied before, of its shape [rad/s or m/s], read-only.
             limits: the limits in force, as seen from the true configuration.
             dt: control period [s].
         """
@@ -128,6 +129,52 @@ class StartedPlant:
         broken = self._watch(self._scenario, step)
         if broken:
             raise ProtectiveStop(f"{broken.reason} = {broken.figure:.4g}")
+
+
+class ManyStarted:
+    """A plant in N trials that run in lockstep, a row each (see `StartedPlant`).
+
+    Attributes:
+        watches: whether it may stop a robot.
+    """
+
+    def __init__(self, plant: Plant, scenarios: Sequence[Scenario], seeds: Sequence[int]) -> None:
+        self._plant = plant
+        self._scenarios = list(scenarios)
+        self._robot, self._dt = scenarios[0].robot, scenarios[0].dt
+        self._random = [np.random.default_rng([seed, NOISE_STREAM]) for seed in seeds]
+        self._applied = np.array([scenario.v0 for scenario in scenarios])
+        self._arriving = deque([self._applied] * plant.delay)
+        self.watches = type(plant).watch is not Plant.watch
+
+    def seen(self, q: Array) -> Array:
+        """Measure the true configurations, (N, nq); without noise the result is `q` itself."""
+        if not self._plant.noise:
+            return q
+        nv = self._robot.nv
+        errors = np.array([each.normal(0.0, self._plant.noise, nv) for each in self._random])
+        return integrated(self._robot, q, errors)
+
+    def apply(self, v: Array, limits: Limits) -> Array:
+        """Send commands (N, nv), and return the velocities with which the robots move."""
+        self._arriving.append(v)
+        arrived = self._arriving.popleft()
+        self._applied = self._plant.drive(arrived, self._applied, limits, self._dt)
+        return self._applied
+
+    def watch(self, row: int, step: Step) -> None:
+        """Watch a step that was applied (see `StartedPlant.watch`)."""
+        broken = self._plant.watch(self._scenarios[row], step)
+        if broken:
+            raise ProtectiveStop(f"{broken.reason} = {broken.figure:.4g}")
+
+    def keep(self, kept: Mask) -> None:
+        """Go on with some of the trials."""
+        rows = np.flatnonzero(kept).tolist()
+        self._scenarios = [self._scenarios[row] for row in rows]
+        self._random = [self._random[row] for row in rows]
+        self._applied = self._applied[kept]
+        self._arriving = deque([v[kept] for v in self._arriving])
 
 
 @dataclass(frozen=True)

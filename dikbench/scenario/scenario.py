@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from dikbench.arrays import Array
 from dikbench.problem.constraints import Constraint, TorqueConstraint
-from dikbench.problem.embedding import Embedding, embedding_of
+from dikbench.problem.embedding import Embedding, Placements, embedding_of
 from dikbench.problem.tasks import Task, TrackingTask, TrackingTogether
 from dikbench.problem.tasks.task import check_rotation
 from dikbench.robots.robot import Robot
@@ -176,6 +176,25 @@ class Scenario:
         if not self.reference.moving:
             return None
         return embedded_path(self.reference, self.embedding, self.dt)
+
+    def points_at(
+        self, times: Array, placements: Placements, targets: Placements
+    ) -> tuple[Array, Array]:
+        """Map placements of the task frame, and of its targets, to points, (n, d) [m] each.
+
+        Where points are by the task's error, those of the targets are on the pieces of the path.
+
+        Args:
+            times: nominal times of the targets, (n,) [s].
+            placements: rotations (n, 3, 3) and translations (n, 3) [m] of the task frame.
+            targets: the same of the targets.
+        """
+        embedding, path = self.embedding, self.embedded_path
+        if path is not None and embedding.by_error:
+            at = path.at(times)
+        else:
+            at = embedding.points(*targets)
+        return embedding.beside(placements, targets, at), at
 
     @property
     def limits_torques(self) -> bool:

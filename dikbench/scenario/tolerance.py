@@ -39,13 +39,15 @@ def sampling_floor(scenario: Scenario) -> float:
     robot, dt, path = scenario.robot, scenario.dt, scenario.embedded_path
     assert path is not None
     kinematics, q = Kinematics(robot), scenario.q0
-    rotations, translations = [], []
-    for k in range(round(scenario.reference.duration / dt) + 1):
+    made, wanted, count = [], [], round(scenario.reference.duration / dt) + 1
+    for k in range(count):
         kinematics.update(q)
-        placement = kinematics.placement(robot.frame_id)
-        rotations.append(placement.rotation.copy())
-        translations.append(placement.translation.copy())
-        task = scenario.first.linearize(kinematics, *scenario.target(k * dt))
+        target, twist = scenario.target(k * dt)
+        made.append(kinematics.placement(robot.frame_id).homogeneous)
+        wanted.append(target.homogeneous)
+        task = scenario.first.linearize(kinematics, target, twist)
         q = pin.integrate(robot.model, q, dt * (pseudo_inverse(task.J, RCOND) @ task.V))
-    points = scenario.embedding.points(np.array(rotations), np.array(translations))
+    X, X_d = np.array(made), np.array(wanted)
+    parts = (X[:, :3, :3], X[:, :3, 3]), (X_d[:, :3, :3], X_d[:, :3, 3])
+    points, _ = scenario.points_at(dt * np.arange(count, dtype=float), *parts)
     return float(path.nearest(points)[0].max()) if np.isfinite(points).all() else np.inf

@@ -113,9 +113,8 @@ def does_the_task(
     )
     wanted = np.array([reference.placement(tau).homogeneous for tau in times])
     made, (a, b) = placements(robot, robot.frame_id, q), (slice(0, 3), 3)
-    off = embedding.points(made[:, a, a], made[:, a, b]) - embedding.points(
-        wanted[:, a, a], wanted[:, a, b]
-    )
+    targets = wanted[:, a, a], wanted[:, a, b]
+    off = embedding.beside((made[:, a, a], made[:, a, b]), targets) - embedding.points(*targets)
     return bool(np.linalg.norm(off, axis=1).max() <= OFF_PATH_M)
 
 

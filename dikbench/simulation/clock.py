@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, Final, Literal, Protocol
 
+import numpy as np
 import pinocchio as pin
 
 from dikbench.arrays import Array
@@ -83,7 +84,7 @@ class PathClock:
         self._duration = scenario.reference.duration
         longest = scenario.longest_path_run * self._duration
         self.most_steps = max(1, round(longest / self._dt))
-        self._path, self._embedding = scenario.embedded_path, scenario.embedding
+        self._path, self._scenario = scenario.embedded_path, scenario
         self._frame, self._model = scenario.robot.frame_id, scenario.robot.model
         self._data = self._model.createData()
 
@@ -98,7 +99,13 @@ class PathClock:
         """Advance to where the robot is, at most by one control period (see `Clock`)."""
         pin.forwardKinematics(self._model, self._data, q)
         X = pin.updateFramePlacement(self._model, self._data, self._frame)
-        point = self._embedding.points(X.rotation[None], X.translation[None])[0]
+        made, embedding = (X.rotation[None], X.translation[None]), self._scenario.embedding
+        if embedding.by_error:
+            target = self._scenario.reference.placement(self.tau)
+            wanted = target.rotation[None], target.translation[None]
+            point = self._scenario.points_at(np.array([self.tau]), made, wanted)[0][0]
+        else:
+            point = embedding.points(*made)[0]
         first, last = self.tau - LOOK_BACK_S, self.tau + 2 * self._dt
         near = self._path.latest_nearest(point, max(first, 0.0), min(last, self._duration))
         ahead = min(self.tau + self._dt, max(self.tau, near + self._dt))

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 import pinocchio as pin
 
-from dikbench.arrays import Array, read_only
+from dikbench.arrays import Array, Indices, read_only
 from dikbench.problem.posing import pose_problem
 from dikbench.problem.problem import Formulation
 from dikbench.problem.progress import STUCK_PROGRESS, progress, row_weights
@@ -116,7 +116,7 @@ def simulate(
             v = read_only(answer.velocity)
             applied = started.apply(v, limits)
             steps.append(
-                (q, clock.tau, desired, jacobian, v, applied, answer.status, problem.relaxed)
+                (q, clock.tau, desired, jacobian, v, applied, answer.status, int(problem.relaxed))
             )
             before, q = q, read_only(pin.integrate(model, q, applied * dt))
             clock.advance(q)
@@ -126,11 +126,11 @@ def simulate(
         status, message = ended.status, f"step {len(steps)}: {ended}"
     except ProtectiveStop as stop:
         status, message = Status.PROTECTIVE_STOP, f"step {len(steps) - 1}: {stop}"
-    trace, jacobians = _recorded(scenario, steps, q, clock.tau, solve.rechecked(), mode)
+    trace, jacobians = _joined_record(scenario, steps, q, clock.tau, solve.rechecked(), mode)
     return Run(trace, status, message, kinematics_ns, formulation_ns, jacobians)
 
 
-def _recorded(
+def _joined_record(
     scenario: Scenario,
     steps: list[_Step],
     q: Array,
@@ -138,30 +138,61 @@ def _recorded(
     rechecked: RecheckedSteps,
     mode: ReferenceMode,
 ) -> tuple[Trace, Array]:
-    """Make the trace and the Jacobians (n, m, nv) of steps that ended in q at tau.
-
-    Steps that made less than `STUCK_PROGRESS` of the desired motion become `stuck`.
-    """
-    n, nv, m = len(steps), scenario.robot.nv, len(scenario.rows)
+    """Make the trace and the Jacobians (n, m, nv) of steps that ended in q at tau."""
+    nv, m = scenario.robot.nv, len(scenario.rows)
     columns = [*zip(*steps, strict=True)] or [()] * 8
-    before, taus, desired_list, jacobian_list, commanded_list, applied, statuses, relaxed = columns
-    desired, commanded = _joined(desired_list, m), _joined(commanded_list, nv)
+    before, taus, desired, jacobian_list, commanded, applied, statuses, relaxed = columns
     jacobians = _joined(jacobian_list, m, nv)
-    achieved = np.einsum("kij,kj->ki", jacobians, commanded)
-    alpha = progress(desired, achieved, row_weights(scenario.rows))
-    status = np.array([STEP_STATUSES.index(each) for each in statuses], dtype=int)
-    ok = STEP_CODE[Status.OK]
-    status[(status == ok) & rechecked.lied[:n]] = STEP_CODE[Status.NOT_VERIFIED]
-    status[(status == ok) & (alpha < STUCK_PROGRESS)] = STEP_CODE[Status.STUCK]
-    trace = Trace(
-        scenario.dt,
+    trace = recorded(
+        scenario,
         _joined((*before, q), scenario.robot.nq),
         np.array([*taus, tau]),
+        _joined(desired, m),
+        jacobians,
+        _joined(commanded, nv),
+        _joined(applied, nv),
+        np.array([STEP_STATUSES.index(each) for each in statuses], dtype=int),
+        np.array(relaxed, dtype=int),
+        rechecked,
+        mode,
+    )
+    return trace, jacobians
+
+
+def recorded(
+    scenario: Scenario,
+    q: Array,
+    tau: Array,
+    desired: Array,
+    jacobians: Array,
+    commanded: Array,
+    applied: Array,
+    status: Indices,
+    relaxed: Indices,
+    rechecked: RecheckedSteps,
+    mode: ReferenceMode,
+) -> Trace:
+    """Make the trace of n control steps; for the arguments see `Trace`.
+
+    Steps whose solver lied become `not-verified`, those that made less than `STUCK_PROGRESS` of the
+    desired motion `stuck`. The Jacobians (n, m, nv) are the formulation's.
+    """
+    n = len(applied)
+    achieved = np.einsum("kij,kj->ki", jacobians, commanded)
+    alpha = progress(desired, achieved, row_weights(scenario.rows))
+    ok = STEP_CODE[Status.OK]
+    status = status.copy()
+    status[(status == ok) & rechecked.lied[:n]] = STEP_CODE[Status.NOT_VERIFIED]
+    status[(status == ok) & (alpha < STUCK_PROGRESS)] = STEP_CODE[Status.STUCK]
+    return Trace(
+        scenario.dt,
+        q,
+        tau,
         desired,
         commanded,
-        _joined(applied, nv),
+        applied,
         status,
-        np.array(relaxed, dtype=int),
+        relaxed,
         rechecked.claimed[:n],
         rechecked.verified[:n],
         rechecked.primal[:n],
@@ -170,7 +201,6 @@ def _recorded(
         rechecked.distance[:n],
         mode,
     )
-    return trace, jacobians
 
 
 def _joined(parts: Sequence[Array], *shape: int) -> Array:

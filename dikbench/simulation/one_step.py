@@ -20,6 +20,8 @@ from dikbench.problem.problem import (
     Formulation,
     program_of,
     refusal_of,
+    sees_lower_tasks,
+    sees_weights,
     sight_of,
 )
 from dikbench.problem.progress import STUCK_PROGRESS, progress, row_weights
@@ -87,18 +89,19 @@ def solve_dik(
         reference_frame: the axes in which the twist is given, Pinocchio's names; default: LOCAL.
         gain: gain on the target's error [1/s]; default: 1/dt, which reaches it in one step.
         weight: weight of the twist or target where tasks compete, one number or one per row of
-            `Robot.task_rows`.
+            `Robot.task_rows`; any but 1 needs a formulation that sees `weights`.
         priority: its priority; 1 is the most important.
         dt: control period [s].
         solver: a solver's selector, such as `osqp[eps_abs=1e-6]`; default: daqp[then=clarabel],
             or clarabel for a formulation written in cvxpy. Not used by formulations that need none.
         v_prev: velocity applied in the previous step, (nv,); None: no acceleration bound.
-        tasks: other tasks, in any order, of any priority (those below the first are secondary).
+        tasks: other tasks, in any order, of any priority (those below the first are secondary,
+            and need a formulation that sees them).
         constraints: conditions in addition to the joint limits.
 
     Raises:
         DikbenchError: on a wrong name, shape or value, or a formulation that refuses such a
-            problem, raises an error or returns a wrong shape or NaN.
+            problem, does not look at some of it, raises an error or returns a wrong shape or NaN.
     """
     if not isinstance(robot, Robot):
         raise DikbenchError(
@@ -132,7 +135,7 @@ def solve_dik(
         main = _target_task(kinematics, target, 1 / dt if gain is None else gain)
     _rank("twist" if target is None else "target", main, weight, priority)
     problem = pose_problem(kinematics, previous, dt, main, tasks, constraints)
-    reason = refusal_of(formulation, problem) or _unseen(formulation, problem, priority)
+    reason = refusal_of(formulation, problem) or _unseen(formulation, problem)
     if reason:
         raise DikbenchError(f"formulation {type(formulation).__name__}: {reason}")
     solve = _solve_for(formulation, solver)
@@ -147,7 +150,7 @@ def solve_dik(
         status = Status.NOT_VERIFIED
     if status is Status.OK and alpha < STUCK_PROGRESS:
         status = Status.STUCK
-    return DikAnswer(v, alpha, status, problem.relaxed)
+    return DikAnswer(v, alpha, status, int(problem.relaxed))
 
 
 def _solve_for(formulation: Formulation, selector: str | None) -> CheckedSolve:
@@ -172,11 +175,21 @@ def _rank(what: str, task: LinearizedTask, weight: Any, priority: object) -> Non
     task.priority = priority
 
 
-def _unseen(formulation: Formulation, problem: DikProblem, priority: int) -> str:
-    """Why the main task would be ignored; empty where it is not."""
-    if priority == problem.tasks[0].priority or "lower-tasks" in sight_of(formulation):
-        return ""
-    return f"does not look at tasks below the first priority, such as this one of {priority}"
+def _unseen(formulation: Formulation, problem: DikProblem) -> str:
+    """Why some of what is given would be ignored; empty where nothing is."""
+    if sees_lower_tasks(formulation, problem) is False:
+        but = "but postures " if "postures" in sight_of(formulation) else ""
+        return (
+            f"does not look at tasks {but}below the first priority, such as one of priority "
+            f"{problem.tasks[-1].priority}; leave them out, or take a formulation that sees "
+            "'lower-tasks'"
+        )
+    if sees_weights(formulation, problem) is False:
+        return (
+            "does not look at weights; leave those of the first priority at 1 and those of a lower "
+            "one equal, or take a formulation that sees 'weights'"
+        )
+    return ""
 
 
 def _check_positive(name: str, value: object) -> None:

@@ -34,6 +34,7 @@ class CheckedSolve:
         calls: number of programs solved.
         solve_ns: time inside the solver and its interface [ns].
         core_ns: time inside the solver library alone [ns].
+        tolerance: largest residual of a verified answer.
         checking_ns: time spent on deciding why there is no answer, which counts for nobody [ns].
     """
 
@@ -43,18 +44,18 @@ class CheckedSolve:
         "_rechecked",
         "_solved",
         "_step",
-        "_tolerance",
         "calls",
         "checking_ns",
         "core_ns",
         "solve_ns",
+        "tolerance",
     )
 
     def __init__(
         self, back_end: BackEnd, *, tolerance: float = TOLERANCES["default"], checks: bool = True
     ) -> None:
         self._back_end = back_end
-        self._tolerance = tolerance
+        self.tolerance = tolerance
         self._checks = checks
         self._solved: list[Solved] = []
         self._rechecked = RecheckedSteps(0)
@@ -82,8 +83,12 @@ class CheckedSolve:
         return self._rechecked
 
     def _recheck(self) -> None:
-        self._rechecked.recheck(self._solved, self._tolerance)
+        self._rechecked.recheck(self._solved, self.tolerance)
         self._solved.clear()
+
+    def answer(self, program: QuadraticProgram, call: int) -> Answer:
+        """Ask the back end, without a record of it; `call` is the number within the step."""
+        return self._back_end(program, call)
 
     def __call__(self, program: QuadraticProgram | ModelledProgram) -> Array:
         """Solve a program (see `Solve`)."""

@@ -34,6 +34,7 @@ from dikbench.problem.problem import (
 from dikbench.programs.quadratic_program import ProgramKind
 from dikbench.simulation.status import Status
 from dikbench.testing.asked import LIMIT_TOLERANCE_RAD_S, Asked, asked_of
+from dikbench.testing.rows import check_rows
 from dikbench.testing.sight import check_sight
 from dikbench.testing.states import State, states
 
@@ -261,6 +262,7 @@ CHECKS: Final[tuple[Check, ...]] = (
     check_velocity_limits,
     check_acceleration_limits,
     check_inequalities,
+    check_rows,
 )
 """Every check: (formulation, solver's selector or None for the default) -> None.
 

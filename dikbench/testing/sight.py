@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from types import MappingProxyType
 from typing import Final
 
@@ -42,6 +43,12 @@ def _with_task(problem: DikProblem, random: np.random.Generator) -> DikProblem:
     return _changed(problem, (problem.tasks[0], added), None, None)
 
 
+def _with_weights(problem: DikProblem, random: np.random.Generator) -> DikProblem:
+    task = copy(problem.tasks[0])
+    task.weight = random.uniform(0.1, 10.0, len(task.V))
+    return _changed(problem, (task,), None, None)
+
+
 Change = Callable[[DikProblem, np.random.Generator], DikProblem]
 
 ADDED: Final[Mapping[str, tuple[Change, frozenset[ProblemPart]]]] = MappingProxyType(
@@ -52,6 +59,7 @@ ADDED: Final[Mapping[str, tuple[Change, frozenset[ProblemPart]]]] = MappingProxy
             frozenset({"postures", "lower-tasks"}),
         ),
         "a task below the first priority": (_with_task, frozenset({"lower-tasks"})),
+        "a weight of each row": (_with_weights, frozenset({"weights"})),
     }
 )
 """What is added to problems, and which parts, any of which, declare that it is seen."""
@@ -68,7 +76,7 @@ def check_sight(formulation: Formulation | Asked, solver: str | None = None) -> 
     """Check that what a formulation sees changes its answer somewhere, and nothing else does ever.
 
     Rows that it only promises to keep need change nothing. Each state is asked with one task, and
-    with rows G v <= h, a posture task or another task of lower priority in addition.
+    with rows G v <= h, a posture task, another task of lower priority or weights in addition.
     """
     asked = asked_of(formulation, solver)
     seen = sight_of(asked.formulation)

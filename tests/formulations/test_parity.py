@@ -15,6 +15,7 @@ from dikbench import DikAnswer, Robot, load_robot, solve_dik
 from dikbench.arrays import Array
 from dikbench.plugins.building import make_formulation
 from dikbench.problem import DikProblem
+from dikbench.problem.problem import sight_of
 from dikbench.problem.tasks import LinearizedTask, PoseTask, PostureTask
 from formulations.drake_system import scaled_bounds
 
@@ -32,6 +33,7 @@ def load(name: str) -> list[dict[str, Any]]:
     return records
 
 
+SEEN = {"postures", "lower-tasks"}
 CASES = {case["id"]: case for case in load("cases.json")}
 
 
@@ -46,7 +48,8 @@ def limited(case: str, in_force: str) -> Robot:
 
 
 def answer(law: str, robot: Robot, q: object, V: object, posture: Array) -> DikAnswer:
-    """Our answer at a state, with a posture task."""
+    """Our answer at a state, with a posture task where the law sees one."""
+    postures = [PostureTask(target=posture)] if sight_of(make_formulation(law)) & SEEN else []
     return solve_dik(
         robot,
         q,
@@ -55,7 +58,7 @@ def answer(law: str, robot: Robot, q: object, V: object, posture: Array) -> DikA
         reference_frame="LOCAL_WORLD_ALIGNED",
         dt=DT,
         solver="daqp",
-        tasks=[PostureTask(target=posture)],
+        tasks=postures,
     )
 
 

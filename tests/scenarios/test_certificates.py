@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
-from makers.scenarios import put_robot, scenario_of
+from makers.scenarios import error_of, put_robot, scenario_of
+from makers.urdfs import DATA
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.plugins.building import make_scenario
+from dikbench.plugins.building import make_family, make_scenario
 from dikbench.plugins.finding import plugins
 from dikbench.problem.tasks import PostureTask
 from dikbench.robots.kinematics import Kinematics
@@ -418,3 +419,19 @@ def test_a_broken_certificate_stops_the_scenario(monkeypatch: pytest.MonkeyPatch
     for name in CLOSED:
         with pytest.raises(DikbenchError, match=r"^certificate of .* failed: "):
             make_scenario(name)
+
+
+@pytest.mark.parametrize(
+    ("selector", "names"),
+    [
+        ("pick-and-place[robot=tiago,width=0.4,height=0.15,turn=1.5]", ("width", "height", "turn")),
+        (f"workspace-boundary[robot={DATA}/limits_above_pi.urdf,frame=tool]", ("frame", "rows")),
+    ],
+)
+def test_what_cannot_be_done_names_what_to_change(selector: str, names: tuple[str, ...]) -> None:
+    """Parameters that the family has."""
+    said = error_of(make_scenario, selector)
+    family = make_family(selector)
+    for name in names:
+        assert f"{name}=" in said.rpartition("(")[2]
+        assert hasattr(family, name)

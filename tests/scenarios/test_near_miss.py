@@ -6,11 +6,13 @@ import importlib.metadata
 import sys
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 import pytest
 from makers.scenarios import known_singularity, scenario_error, scenario_of
+from makers.urdfs import SIX, write_arm
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
@@ -216,3 +218,11 @@ def test_what_cannot_be_is_one_line(parameters: str, parts: list[str]) -> None:
     message = scenario_error(f"near-miss[{parameters}]")
     for part in parts:
         assert part in message
+
+
+def test_without_speed_limits_the_distance_says_that_it_is_near(tmp_path: Path) -> None:
+    """With limits that are never reached it is not the singularity that is difficult."""
+    for speed, situation in (("0", "near singularities"), ("1e9", "free space")):
+        limit = f'lower="-3" upper="3" effort="10" velocity="{speed}"'
+        arm = write_arm(tmp_path, [replace(joint, limit=limit) for joint in SIX], f"arm{speed}")
+        assert make_scenario(f"near-miss[robot={arm},frame=tool]").situation == situation

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import pinocchio as pin
@@ -16,6 +16,9 @@ from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.robot import Robot
 from dikbench.robots.task_rows import ALL_ROWS, PLANE_ROWS
 
+TILTS: Final = frozenset({3, 4})
+"""The rows of turns about axes in the plane."""
+
 
 @dataclass(frozen=True, eq=False)
 class PoseTask(FrameTask):
@@ -25,8 +28,9 @@ class PoseTask(FrameTask):
 
     with X the placement of the frame, X_d the target, V_d the target's own body twist and J the
     body Jacobian: twists are (linear; angular) [m/s; rad/s] in the axes of the frame. In the plane
-    (`Robot.task_rows` of (0, 1, 5)) the other rows are left out. Where other rows are asked for,
-    position and orientation are brought there independently, in the robot's task axes:
+    (`Robot.task_rows` of (0, 1, 5) of an arm that cannot tilt) the other rows are left out. Where
+    other rows are asked for, position and orientation are brought there independently, in the
+    robot's task axes:
 
         e = (R^T (p_d - p); rotation error),   V = (R^T R_d v_d; R^T R_d w_d) + gain e
 
@@ -53,7 +57,8 @@ class PoseTask(FrameTask):
         check_rotation("pose task", X_d.rotation)
         check_weight("pose task", self.weight, len(robot.task_rows))
         X = kinematics.placement(index)
-        if robot.task_rows not in (ALL_ROWS, PLANE_ROWS) or robot.task_axes == "world":
+        in_plane = robot.task_rows == PLANE_ROWS and not TILTS & {*robot.movable_rows}
+        if not (in_plane or robot.task_rows == ALL_ROWS) or robot.task_axes == "world":
             return self._parts(kinematics, X, X_d, velocity)
         relative = X.actInv(X_d)
         error: Array = pin.log6(relative).np

@@ -14,6 +14,7 @@ import scipy.linalg
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
+from dikbench.linear_algebra import product, times, transposed
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.robot import Robot, frame_id
 
@@ -59,8 +60,8 @@ class LinearizedTask(msgspec.Struct, eq=False):
         Jl = self.log_derivative if log_derivative else None
         if Jl is not None:
             J, V = Jl @ J, Jl @ V
-        weighted = J.T * self.weight
-        return weighted.dot(J), weighted.dot(V)
+        weighted = transposed(J) * self.weight
+        return product(weighted, J), times(weighted, V)
 
 
 class LinearizedJointTask(LinearizedTask, eq=False):

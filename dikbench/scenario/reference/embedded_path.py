@@ -81,6 +81,15 @@ class EmbeddedPath:
         """Find the last sample whose nominal time is not after these [s]: its number."""
         return np.searchsorted(self.times, np.asarray(times) + SAME_INSTANT_S, side="right") - 1
 
+    def at(self, times: Array) -> Array:
+        """Compute the path's points at nominal times (n,) [s], (n, d) [m]; its ends outside."""
+        pieces = np.searchsorted(self.times, times, side="right") - 1
+        pieces = np.clip(pieces, 0, len(self.pieces) - 1)
+        share = (times - self.times[pieces]) / (self.times[pieces + 1] - self.times[pieces])
+        share = np.clip(share, 0.0, 1.0)
+        points: Array = self.points[pieces] + share[:, None] * self.pieces[pieces]
+        return points
+
     def nearest(self, points: Array) -> tuple[Array, Indices, Array]:
         """Find the nearest points of the path as a set; of equally near ones the first.
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import math
 import os.path
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import Decimal, DecimalException
+from io import StringIO
 from itertools import zip_longest
 from typing import Any, Final
 
@@ -19,6 +22,9 @@ from dikbench.errors import DikbenchError
 POSE_COLUMNS: Final = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
 
 SEPARATORS: Final = (",", ";", "\t")
+
+DECIMAL_COMMA: Final = re.compile(r"^([+-]?\d*),(\d+(?:[eE][+-]?\d+)?)$")
+"""A number such as 0,5 or -1,5e-3."""
 
 COMMENT: Final = "#"
 """A line that begins with it is no row; it may hold the header, as numpy.savetxt writes it."""
@@ -54,9 +60,10 @@ class PoseFile:
 def read_poses(path: str) -> PoseFile:
     """Read a CSV file with the columns t [s], x, y, z [m], qx, qy, qz, qw (unit quaternion).
 
-    Columns may be in any order, others are ignored; commas, semicolons or tabs separate them. Lines
-    that are empty or begin with # are no rows. Times count from the first row, which is subtracted
-    in decimal digits: stamps of a clock, such as 1700000000.02, lose none.
+    Columns may be in any order, others are ignored; commas, semicolons or tabs separate them, and
+    between the latter two 0,5 is 0.5. Lines that are empty or begin with # are no rows. Times count
+    from the first row, which is subtracted in decimal digits: stamps of a clock, such as
+    1700000000.02, lose none. The text is UTF-8, UTF-16 with its mark, or else Latin-1.
 
     Raises:
         DikbenchError: if the file, a column or a value is missing, a column stands twice, a row has
@@ -96,28 +103,42 @@ def _rows(path: str) -> Iterator[tuple[int, dict[str, str]]]:
     """Yield the number of the line of each row, and its values by column."""
     header: list[str] = []
     separator = SEPARATORS[0]
-    with open(path, encoding="utf-8-sig") as file:
-        for line, text in enumerate(file, start=1):
-            where = f"pose file {path}, line {line}"
-            text = text.strip("\n")
-            comment = text.lstrip().startswith(COMMENT)
-            if not text.strip() or (comment and header):
-                continue
-            if header:
-                cells = _cells(text, separator)
-                if any(cells[len(header) :]):
-                    raise DikbenchError(
-                        f"{where}: {len(cells)} values; the header has {len(header)} columns"
-                    )
-                yield line, dict(zip_longest(header, cells[: len(header)], fillvalue=""))
-                continue
-            separator = max(SEPARATORS, key=text.count)
-            names = _cells(text.lstrip(f"{COMMENT} ") if comment else text, separator)
-            if not comment or set(POSE_COLUMNS) <= set(names):
-                _check_header(names, text, path)
-                header = names
+    for line, text in enumerate(StringIO(_text(path), newline=None), start=1):
+        where = f"pose file {path}, line {line}"
+        text = text.strip("\n")
+        comment = text.lstrip().startswith(COMMENT)
+        if not text.strip() or (comment and header):
+            continue
+        if header:
+            cells = _cells(text, separator)
+            if any(cells[len(header) :]):
+                raise DikbenchError(
+                    f"{where}: {len(cells)} values; the header has {len(header)} columns"
+                    + (" (numbers such as 0,5 need ; between them)" if separator == "," else "")
+                )
+            if separator != ",":
+                cells = [DECIMAL_COMMA.sub(r"\1.\2", cell) for cell in cells]
+            yield line, dict(zip_longest(header, cells[: len(header)], fillvalue=""))
+            continue
+        separator = max(SEPARATORS, key=text.count)
+        names = _cells(text.lstrip(f"{COMMENT} ") if comment else text, separator)
+        if not comment or set(POSE_COLUMNS) <= set(names):
+            _check_header(names, text, path)
+            header = names
     if not header:
         _check_header([], "", path)
+
+
+def _text(path: str) -> str:
+    """Read a text; of one that is not Unicode, names and numbers are the same in Latin-1."""
+    with open(path, "rb") as file:
+        content = file.read()
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return content.decode("utf-16")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("latin-1")
 
 
 def _cells(text: str, separator: str) -> list[str]:

@@ -16,6 +16,7 @@ from typing import get_args
 import pandas as pd
 import pytest
 from click.testing import CliRunner, Result
+from makers.urdfs import SIX, write_arm
 
 from dikbench.cli import commands
 from dikbench.cli.listing import listing
@@ -108,7 +109,10 @@ MALFORMED = [
     (("show", "dls[damping=-1]"), ("damping=-1.0", "finite and at least 0")),
     (("show", "osqp[eps=1]"), ("eps", "eps_abs")),
     (("show", "saturating[delay=x]"), ("delay='x'", "a whole number, 0 to 1000 [steps]")),
-    (("show", "panda[x=1]"), ("panda has no parameters", "valid in brackets")),
+    (("show", "panda[x=1]"), ("unknown parameter of robot panda 'x'", "valid: acceleration")),
+    (("show", "nowhere.xacro[lock=j1]"), ("robot file not found: nowhere.xacro",)),
+    (("show", "panda[lock=elbow]"), ("unknown joint 'elbow' of robot panda", "panda_joint1")),
+    (("show", "quick[x=1]"), ("quick has no parameters", "valid in brackets")),
     (("show", "lag_max_s[x=1]"), ("lag_max_s has no parameters",)),
     (("show", "nofile.py:Family"), ("error: file not found: nofile.py",)),
     (
@@ -514,6 +518,19 @@ def test_the_frames_of_a_robot_are_shown_with_what_moves_them(tmp_path: Path) ->
     assert {k: found[k] for k in ("floor", "cart", "hand", "camera")} == {
         "floor": "0", "cart": "1", "hand": "2", "camera": "1",
     }  # fmt: skip
+
+
+def test_a_robot_is_shown_with_what_a_family_can_be_given(tmp_path: Path) -> None:
+    """Rows, locked joints and limits by hand, of a file and of the catalogue."""
+    arm = write_arm(tmp_path, SIX)
+    shown = in_process("show", f"{arm}[frame=tool,rows=xyz,lock=j2=0.5 j6,acceleration=7]").output
+    assert "a robot from a URDF; task frame tool\n" in shown
+    assert "asked for: rows=xyz; its 4 joints move xyzrxryrz\n" in shown
+    assert "4 velocities" in shown
+    assert "j1 (0): turns; position -3 to 3 rad; speed 2 rad/s; acceleration 7 rad/s^2" in shown
+    assert "\n    j2 (" not in shown
+    assert "acceleration limits (given by hand)" in shown
+    assert "6 velocities" in in_process("show", "panda[lock=panda_joint1]").output
 
 
 def test_every_word_of_a_verdict_is_explained() -> None:

@@ -54,7 +54,7 @@ class _Rollout:
             )
             box = velocity_box(limits, v, dt, braking)
             assert np.all(box.lower <= box.upper)
-            self.relaxed += box.relaxed
+            self.relaxed += int(box.relaxed)
             v = np.clip(box.lower + choice * (box.upper - box.lower), box.lower, box.upper)
             x = x + v * dt
             applied.append(v)

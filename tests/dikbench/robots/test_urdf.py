@@ -379,3 +379,30 @@ def test_any_text_as_a_urdf_gives_one_line(tmp_path: Path, text: str) -> None:
     with pytest.raises(DikbenchError) as caught:
         load_robot(str(path), frame="b")
     assert "\n" not in str(caught.value)
+
+
+def test_a_xacro_file_is_to_be_expanded_first(tmp_path: Path) -> None:
+    """Whatever its name; what xacro wrote, which keeps the name space, is a URDF."""
+    text = Path(write_arm(tmp_path, SIX)).read_text()
+    space = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" '
+    expanded = text.replace("<robot ", space, 1)
+    assert expanded != text
+    unexpanded = expanded.replace("</robot>", '<xacro:gripper side="left"/></robot>')
+    for name in ("arm.xacro", "arm.urdf.xacro", "left.urdf"):
+        path = tmp_path / name
+        path.write_text(unexpanded)
+        with pytest.raises(DikbenchError, match=r"is a xacro file; run `xacro .* > robot\.urdf`"):
+            load_robot(str(path), "tool")
+        path.write_text(expanded)
+        assert load_robot(str(path), "tool").nv == 6
+    with pytest.raises(DikbenchError, match=r"robot file not found: other\.xacro"):
+        load_robot("other.xacro", "tool")
+
+
+def test_an_effort_limit_is_the_joints_own_whatever_follows_it(tmp_path: Path) -> None:
+    """A follower with a motor would widen it and one on a linkage would not: nobody tells."""
+    limit = 'lower="-1" upper="1" effort="0.5" velocity="1"'
+    joints = [*SIX, Joint("0 0 1", limit=limit, mimic='joint="j6" multiplier="-2"')]
+    robot = load_robot(write_arm(tmp_path, joints), "tool")
+    assert robot.available_effort is not None
+    assert robot.available_effort.tolist() == [10.0] * 6

@@ -28,6 +28,8 @@ ROWS = (
     "xyzryrz",
     "xyzrz",
     "zrx",
+    "xyrz",
+    "xry",
     "world:xy",
     "world:xyzrxry",
     "world:xyrz",
@@ -54,6 +56,11 @@ def moved_freely(robot: Robot, X: Any, random: np.random.Generator) -> Any:
     if robot.task_axes == "world":
         return pin.SE3(pin.exp3(angular) @ R, p + linear)
     return pin.SE3(R @ pin.exp3(angular), p + R @ linear)
+
+
+def parts(X: Any) -> tuple[Array, Array]:
+    """Return the rotation (1, 3, 3) and the translation (1, 3) of a placement."""
+    return X.rotation[None], X.translation[None]
 
 
 def error_at(robot: Robot, q: Array, target: Any) -> tuple[Array, Array]:
@@ -92,19 +99,20 @@ def test_the_distance_from_the_path_looks_at_the_same(rows: str, tmp_path: Path)
     kinematics.update(robot.q0)
     X = kinematics.placement(robot.frame_id).copy()
     embedding = embedding_of(PoseTask(), robot, X.rotation)
+    target, at = parts(X), embedding.points(*parts(X))
 
-    def point(placement: Any) -> Array:
-        each: Array = embedding.points(placement.rotation[None], placement.translation[None])[0]
-        return each
+    def away(placement: Any) -> float:
+        return float(np.linalg.norm(embedding.beside(parts(placement), target) - at))
 
-    np.testing.assert_allclose(point(moved_freely(robot, X, random)), point(X), atol=1e-12)
+    assert away(moved_freely(robot, X, random)) < 1e-12
     lever = np.array([1.0, 1.0, 1.0, *[CHARACTERISTIC_LENGTH_M] * 3])[list(robot.task_rows)]
     for _ in range(5):
         q = robot.q0 + 1e-6 * random.normal(size=6)
         error, _ = error_at(robot, q, X)
         kinematics.update(q)
-        away = np.linalg.norm(point(kinematics.placement(robot.frame_id)) - point(X))
-        np.testing.assert_allclose(away, np.linalg.norm(lever * error), rtol=1e-4)
+        np.testing.assert_allclose(
+            away(kinematics.placement(robot.frame_id)), np.linalg.norm(lever * error), rtol=1e-4
+        )
 
 
 @pytest.mark.parametrize("rows", ["xyz", "world:xyz", "xyzrz"])

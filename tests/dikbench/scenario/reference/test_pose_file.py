@@ -111,8 +111,8 @@ def test_a_column_that_stands_twice_is_refused_with_the_header() -> None:
         (["# by a recorder", "0,1,2"], "the header is '0,1,2'"),
         ([HEADER, FIRST, "0,5,0,0,0,0,0,0,0,1"], "line 3: 10 values; the header has 8 columns"),
         (
-            [HEADER.replace(",", ";"), FIRST.replace(",", ";"), "0,5;0;0;0;0;0;0;1"],
-            "line 3: t='0,5' is not a finite number",
+            [HEADER.replace(",", ";"), FIRST.replace(",", ";"), "0,5,1;0;0;0;0;0;0;1"],
+            "line 3: t='0,5,1' is not a finite number",
         ),
         ([HEADER, FIRST, "1e-10,0,0,0,0,0,0,1"], "line 3: t=1e-10 is less than 1 ns after 0"),
         ([HEADER, FIRST, "1e400,0,0,0,0,0,0,1"], "line 3: t='1e400' is not a finite number"),
@@ -159,3 +159,33 @@ def test_a_file_that_is_missing_or_no_text_is_an_error_of_one_line(tmp_path: Pat
     with pytest.raises(DikbenchError, match="is not a CSV file") as caught:
         read_poses(str(binary))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1", "utf-16", "cp1252"])
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_what_a_spreadsheet_writes_is_understood(
+    encoding: str, separator: str, tmp_path: Path
+) -> None:
+    """Its encodings, a note with an umlaut, and decimal commas where no comma separates."""
+    lines = [
+        "t,x,y,z,qx,qy,qz,qw,Prüfer",
+        "0|0,-1|5,|25,1e-3,0,0,0,1,Jörg",
+        "0|5,1,2,3|5e-1,0,0,0,1,",
+    ]
+    text = "\r\n".join(lines).replace(",", separator).replace("|", ",")
+    path = tmp_path / "poses.csv"
+    path.write_bytes(text.encode(encoding))
+    poses = read_poses(str(path))
+    assert poses.times == (0.0, 0.5)
+    assert poses.placements[0].translation.tolist() == [-1.5, 0.25, 1e-3]
+    assert poses.placements[1].translation.tolist() == [1.0, 2.0, 0.35]
+
+
+def test_decimal_commas_between_commas_are_explained(tmp_path: Path) -> None:
+    """They make more values than columns; between semicolons 1,234,5 is no number either."""
+    between = _file(tmp_path, HEADER, "0,0,0,3,0,5,0,1,0,0,0,0")
+    with pytest.raises(DikbenchError, match=r"12 values.*numbers such as 0,5 need ; between them"):
+        read_poses(between)
+    thousands = _file(tmp_path, HEADER.replace(",", ";"), "0;1,234,5;0;0;0;0;0;1")
+    with pytest.raises(DikbenchError, match=r"line 2: x='1,234,5' is not a finite number"):
+        read_poses(thousands)
