@@ -173,12 +173,16 @@ class Coverage:
             g_j(k) = min over k' <= k of max(g_(j-1)(k'), square distance of S_j from segment k')
         """
         bounds, needed = dict.fromkeys(order, 0.0), np.zeros(len(self._lengths))
+        of_sample: dict[int, list[tuple[int, int, int]]] = {}
+        for each in order:
+            of_sample.setdefault(each[0], []).append(each)
         for sample in sorted(self._rows):
             possible = slice(self._earliest[sample], None)
             part = needed[possible]
             np.maximum(part, self._rows[sample][possible], out=part)
             np.minimum.accumulate(part, out=part)
-            bounds.update((each, float(needed[each[1]])) for each in order if each[0] == sample)
+            for each in of_sample.get(sample, ()):
+                bounds[each] = float(needed[each[1]])
         return list(bounds.values())
 
     def _cover(
