@@ -10,10 +10,10 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.arrays import Array
-from dikbench.errors import DikbenchError
 from dikbench.problem.tasks import PoseTask, TrackingTask
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.robot import Robot
+from dikbench.scenario.placing import configurations
 from dikbench.scenario.reference.reference import Reference
 
 ORACLE = "oracle"
@@ -82,27 +82,7 @@ def solve_placement(
     Raises:
         DikbenchError: if the residual (m, rad) does not fall below 1e-9.
     """
-    kinematics, step = Kinematics(robot, robot.scratch), np.zeros(robot.nv)
-    q = seed
-    error = np.inf
-    for _ in range(iterations):
-        kinematics.update(q)
-        task = tracking.linearize(kinematics, target)
-        e, J = task.error, task.J
-        moving = J.any(axis=0)  # a few joints of a humanoid's hundred
-        scale = robot.joint_scale[moving]
-        J = (J if moving.all() else J[:, moving]) * scale
-        before, error = error, float(np.linalg.norm(e))
-        if error < 1e-12 or (error < 1e-9 and error >= before):
-            return q  # there, up to rounding
-        H = J.T @ J
-        H.flat[:: len(H) + 1] += 0.1 * error**2 + 1e-12
-        step[moving] = scale * np.linalg.solve(H, J.T @ e)
-        largest = float(np.abs(step).max())
-        q = pin.integrate(robot.model, q, step * min(1.0, 0.3 / max(largest, 1e-300)))
-    raise DikbenchError(
-        f"robot {robot.name}: no posture found for the placement, residual {error:.2g}"
-    )
+    return configurations(robot, [target], seed, tracking, iterations)[0]
 
 
 def follow(
@@ -122,10 +102,8 @@ def follow(
     Raises:
         DikbenchError: if a sample cannot be reached.
     """
-    q = [q0]
-    for tau in instants[1:]:
-        q.append(solve_placement(robot, reference.placement(tau), q[-1], tracking=tracking))
-    return np.array(q)
+    targets = [reference.placement(tau) for tau in instants[1:]]
+    return np.vstack([q0, *configurations(robot, targets, q0, tracking)])
 
 
 def oracle_motion(
