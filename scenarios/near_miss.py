@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -25,6 +25,7 @@ from dikbench.scenario import (
     Reference,
     Singularity,
     Variation,
+    along_screw,
     analyse,
     at_constant_rate,
     body_twist,
@@ -234,13 +235,13 @@ def _folds(
     """Yield the path from inside to the edge and back, with each of two ways to bend."""
     inward, half = where.inward * where.lost, half_length / speed
 
-    def placement(tau: float) -> Any:
-        return where.placement * pin.exp6(pin.Motion((miss + speed * abs(tau - half)) * inward))
-
-    def velocity(tau: float) -> Array:
-        return (speed if tau >= half else -speed) * inward
-
-    reference = Reference(2 * half, placement, velocity)
+    reference = along_screw(
+        where.placement,
+        inward,
+        lambda tau: miss + speed * abs(tau - half),
+        lambda tau: speed if tau >= half else -speed,
+        2 * half,
+    )
     # To second order: curvature z^2 / 2 along n for a motion z of the joints.
     far = np.sqrt(2 * (miss + half_length) / where.curvature)
     for side in (1.0, -1.0):

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from dikbench.arrays import Array
 from dikbench.problem.tasks import PoseTask, TrackingTask
-from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.kinematics import along, differences, placements
 from dikbench.robots.robot import Robot
 from dikbench.scenario.placing import configurations
 from dikbench.scenario.reference.reference import Reference
@@ -51,6 +50,15 @@ class OracleMotion:
     margin: Array
     reach: Array
     exact: Callable[[float], Array] | None = None
+    _placed: tuple[Any, int, Array] | None = field(default=None, init=False, repr=False)
+
+    def placements(self, robot: Robot) -> Array:
+        """Return the placements of the robot's task frame at the samples, (k + 1, 4, 4)."""
+        known = self._placed
+        if known is None or known[0] is not robot.model or known[1] != robot.frame_id:
+            known = robot.model, robot.frame_id, placements(robot, robot.frame_id, self.q)
+            object.__setattr__(self, "_placed", known)
+        return known[2]
 
     @property
     def peak_speed_ratio(self) -> float:
@@ -102,7 +110,7 @@ def follow(
     Raises:
         DikbenchError: if a sample cannot be reached.
     """
-    targets = [reference.placement(tau) for tau in instants[1:]]
+    targets = reference.targets(instants[1:])
     return np.vstack([q0, *configurations(robot, targets, q0, tracking)])
 
 
@@ -133,23 +141,17 @@ def measure_motion(
     exact: Callable[[float], Array] | None = None,
 ) -> OracleMotion:
     """Measure a joint motion (k + 1, nq) at its instants (k + 1,) [s] (see `OracleMotion`)."""
-    model, rows = robot.model, tracking.rows(robot)
-    periods = np.diff(instants)
-    v = np.array(
-        [pin.difference(model, q[k], q[k + 1]) / period for k, period in enumerate(periods)]
-    ).reshape(len(periods), robot.nv)
-    kinematics = Kinematics(robot)
-    jacobians, reach = np.empty((len(q), len(rows), robot.nv)), []
-    for k, sample in enumerate(q):
-        kinematics.update(sample)
-        jacobians[k] = kinematics.task_jacobian(rows)
-        reach.append(robot.reach_of(kinematics.placement(robot.frame_id)))
-    sigma = np.linalg.svd(jacobians, compute_uv=False)[:, -1].astype(np.float64, copy=False)
+    v = differences(robot, q) / np.diff(instants)[:, None]
+    jacobians, placed = along(robot, q, tracking.rows(robot))
+    reach = np.linalg.norm(placed[:, :3, 3] - robot.shoulder, axis=1)
+    # LAPACK takes three quarters of the time for a tall matrix.
+    sigma = np.linalg.svd(jacobians.mT, compute_uv=False)[:, -1].astype(np.float64, copy=False)
     limit = robot.limits.velocity
     ratio = np.zeros(len(v)) if limit is None else limit.usage(v).max(axis=1)
-    return OracleMotion(
-        instants, q, v, sigma, ratio, _position_margins(robot, q), np.array(reach), exact
-    )
+    margins = _position_margins(robot, q)
+    motion = OracleMotion(instants, q, v, sigma, ratio, margins, reach, exact)
+    object.__setattr__(motion, "_placed", (robot.model, robot.frame_id, placed))
+    return motion
 
 
 def position_margin(robot: Robot, q: Array) -> float:

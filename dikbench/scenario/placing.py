@@ -14,7 +14,7 @@ import pinocchio as pin
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.problem.tasks import OrientationTask, PoseTask, PositionTask, TrackingTask
-from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.kinematics import Kinematics, moved
 from dikbench.robots.robot import Robot
 from dikbench.robots.task_rows import ALL_ROWS, PLANE_ROWS
 
@@ -148,7 +148,8 @@ def _pursue_alike(waiting: list[Pursuit]) -> None:
         if waiting:
             residuals = np.array([each.residual for each in waiting])
             steps = _steps(np.array(jacobians), np.array(errors), residuals, robot.joint_scale)
-            for each, q in zip(waiting, _moved(robot, waiting, steps), strict=True):
+            there = moved(robot, np.array([each.q for each in waiting]), steps)
+            for each, q in zip(waiting, there, strict=True):
                 each.q = q
 
 
@@ -195,15 +196,6 @@ def _steps(J: Array, error: Array, residual: Array, scale: Array) -> Array:
         largest = np.maximum(np.abs(steps).max(axis=1), 1e-300)
         steps *= np.minimum(1.0, LONGEST_STEP / largest)[:, None]
     return steps
-
-
-def _moved(robot: Robot, pursuits: Sequence[Pursuit], steps: Array) -> Iterable[Array]:
-    """Return the configurations of pursuits after their steps (n, nv)."""
-    if robot.nq == robot.nv:
-        moved: Array = np.array([each.q for each in pursuits]) + steps
-        return moved
-    model = robot.model
-    return [pin.integrate(model, each.q, v) for each, v in zip(pursuits, steps, strict=True)]
 
 
 def _alone(pursuit: Pursuit) -> None:

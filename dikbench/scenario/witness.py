@@ -11,7 +11,6 @@ import numpy as np
 from dikbench.arrays import Array, Mask
 from dikbench.problem.constraints import CollisionConstraint, Constraint, TorqueConstraint
 from dikbench.problem.embedding import Embedding
-from dikbench.robots.kinematics import placements
 from dikbench.robots.robot import Robot
 from dikbench.scenario.oracle import OracleMotion
 from dikbench.scenario.reference.reference import Reference
@@ -108,14 +107,11 @@ def does_the_task(
     robot: Robot, motion: OracleMotion, reference: Reference, embedding: Embedding
 ) -> bool:
     """Say whether the samples of a joint motion are on the path, or its end at a target at rest."""
-    times, q = (
-        (motion.instants, motion.q) if reference.moving else ([reference.duration], motion.q[-1:])
-    )
-    wanted = np.array([reference.placement(tau).homogeneous for tau in times])
-    made, (a, b) = placements(robot, robot.frame_id, q), (slice(0, 3), 3)
-    off = embedding.points(made[:, a, a], made[:, a, b]) - embedding.points(
-        wanted[:, a, a], wanted[:, a, b]
-    )
+    last = slice(None) if reference.moving else slice(-1, None)
+    times = motion.instants if reference.moving else np.array([reference.duration])
+    wanted = embedding.points(*reference.placements(times))
+    made = motion.placements(robot)[last]
+    off = embedding.points(made[:, :3, :3], made[:, :3, 3]) - wanted
     return bool(np.linalg.norm(off, axis=1).max() <= OFF_PATH_M)
 
 
