@@ -90,7 +90,8 @@ def solve_placement(
     Raises:
         DikbenchError: if the residual (m, rad) does not fall below 1e-9.
     """
-    return configurations(robot, [target], seed, tracking, iterations)[0]
+    q: Array = configurations(robot, [target], seed, tracking, iterations)[0]
+    return q
 
 
 def follow(

@@ -14,6 +14,7 @@ import pinocchio as pin
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.problem.tasks import OrientationTask, PoseTask, PositionTask, TrackingTask
+from dikbench.problem.tasks.task import check_rotation
 from dikbench.robots.kinematics import Kinematics, moved
 from dikbench.robots.robot import Robot
 from dikbench.robots.task_rows import ALL_ROWS, PLANE_ROWS
@@ -38,11 +39,13 @@ class Pursuit:
     Attributes:
         robot: the robot.
         tracking: the task.
-        targets: where the task frame is to be (`pinocchio.SE3`).
+        targets: where the task frame is to be (`pinocchio.SE3`), at least one.
         q: the configuration to start from, then the present one, (nq,).
-        iterations: largest number of steps for a target.
+        iterations: largest number of looks at the error for a target.
         found: the configurations, (nq,) each.
         failure: why there are not as many as targets.
+        looks: number of looks for the present target.
+        residual: norm of the error (m, rad) at the last one.
     """
 
     robot: Robot
@@ -52,56 +55,81 @@ class Pursuit:
     iterations: int = 200
     found: list[Array] = field(default_factory=list)
     failure: Exception | None = None
-    _looks: int = 0
-    _residual: float = float("inf")
-
-    def arrives(self, look: _Look) -> tuple[Array, Array] | None:
-        """Take in what is seen at the present configuration; None once nothing is left to do.
-
-        Args:
-            look: computes error (m,) and Jacobian (m, nv) there, for a target.
-
-        Returns:
-            The error and the Jacobian for the next step.
-        """
-        while len(self.found) < len(self.targets):
-            if self._looks == self.iterations:
-                raise DikbenchError(
-                    f"robot {self.robot.name}: no posture found for the placement, residual "
-                    f"{self._residual:.2g}"
-                )
-            error, J = look(self.targets[len(self.found)], new=self._looks == 0)
-            before, self._residual = self._residual, sqrt(error.dot(error))
-            self._looks += 1
-            there = self._residual < THERE
-            if not (there or (self._residual < SMALLEST_RESIDUAL and self._residual >= before)):
-                return error, J
-            self.found.append(self.q)
-            self._looks, self._residual = 0, float("inf")
-        return None
+    looks: int = 0
+    residual: float = float("inf")
 
     @property
     def is_ours(self) -> bool:
         """Whether the task is one of dikbench's on a frame, and not a plug-in's own."""
         return type(self.tracking) in OURS
 
-    @property
-    def residual(self) -> float:
-        """Norm of the error (m, rad) where it was last looked at."""
-        return self._residual
+    def look(self, sight: _Sight) -> tuple[Array, Array] | None:
+        """Look from the present configuration at targets, up to one that is not reached there.
 
-    def configurations(self) -> Array:
-        """Return what was found, (k, nq).
+        Returns:
+            Its error (m,) and the Jacobian (m, nv); None once all are reached.
 
         Raises:
-            DikbenchError: if the residual of a target does not fall below 1e-9.
+            DikbenchError: if there were as many looks as are allowed.
         """
-        if self.failure is not None:
-            raise self.failure
-        return np.array(self.found)
+        before = self.residual
+        while True:
+            if self.looks == self.iterations:
+                raise DikbenchError(
+                    f"robot {self.robot.name}: no posture found for the placement, residual "
+                    f"{before:.2g}"
+                )
+            error = sight.error(self, self.targets[len(self.found)])
+            self.looks += 1
+            residual = sqrt(error.dot(error))
+            if not (residual < THERE or (residual < SMALLEST_RESIDUAL and residual >= before)):
+                self.residual = residual
+                return error, sight.jacobian()
+            self.found.append(self.q)
+            self.looks, before = 0, float("inf")
+            if len(self.found) == len(self.targets):
+                return None
 
 
-_Look = Callable[..., tuple[Array, Array]]
+class _Sight:
+    """What pursuits of one kind see at a configuration: the error of their task, and its Jacobian.
+
+    Attributes:
+        kinematics: the robot at the configuration.
+    """
+
+    def __init__(self, pursuit: Pursuit) -> None:
+        robot, tracking = pursuit.robot, pursuit.tracking
+        self.kinematics = Kinematics(robot)
+        self._frame = robot.frame_id
+        self._rows = None if robot.task_rows == ALL_ROWS else np.array(robot.task_rows)
+        # What a pose task does, without what it checks at every step.
+        self._plain = (
+            type(tracking) is PoseTask
+            and tracking.frame in (None, robot.frame)
+            and robot.task_axes == "body"
+            and robot.task_rows in (ALL_ROWS, PLANE_ROWS)
+        )
+        self._J: Array | None = None
+
+    def error(self, pursuit: Pursuit, target: Any) -> Array:
+        """Compute the error for a target, (m,)."""
+        if not self._plain or not (pursuit.looks or pursuit.found):
+            task = pursuit.tracking.linearize(self.kinematics, target)
+            self._J = task.J
+            return task.error
+        if not pursuit.looks:
+            check_rotation("pose task", target.rotation)
+        self._J = None
+        error: Array = pin.log6(self.kinematics.placement(self._frame).actInv(target)).np
+        return error if self._rows is None else error[self._rows]
+
+    def jacobian(self) -> Array:
+        """Compute the Jacobian there, (m, nv)."""
+        if self._J is not None:
+            return self._J
+        J = self.kinematics.jacobian(self._frame)
+        return J if self._rows is None else J[self._rows]
 
 
 def pursue(pursuits: Iterable[Pursuit]) -> None:
@@ -126,17 +154,16 @@ def _kind(pursuit: Pursuit) -> object:
     return id(robot.model), own, scale, type(tracking), getattr(tracking, "frame", None)
 
 
-def _pursue_alike(waiting: list[Pursuit]) -> None:
+def _pursue_alike(pursuits: list[Pursuit]) -> None:
     """Do pursuits of one kind: damped Gauss-Newton steps for all of them together."""
-    robot = waiting[0].robot
-    kinematics = Kinematics(robot)
-    looks = {id(each): _look(each, kinematics) for each in waiting}
-    while waiting:
-        moving, errors, jacobians = [], [], []
+    robot, sight, moving = pursuits[0].robot, _Sight(pursuits[0]), pursuits
+    scale = None if (robot.joint_scale == 1.0).all() else robot.joint_scale
+    while moving:
+        waiting, moving, errors, jacobians = moving, [], [], []
         for each in waiting:
             try:
-                kinematics.update(each.q)
-                seen = each.arrives(looks[id(each)])
+                sight.kinematics.update(each.q)
+                seen = each.look(sight)
             except Exception as failure:
                 each.failure = failure
                 continue
@@ -144,57 +171,52 @@ def _pursue_alike(waiting: list[Pursuit]) -> None:
                 moving.append(each)
                 errors.append(seen[0])
                 jacobians.append(seen[1])
-        waiting = moving
-        if waiting:
-            residuals = np.array([each.residual for each in waiting])
-            steps = _steps(np.array(jacobians), np.array(errors), residuals, robot.joint_scale)
-            there = moved(robot, np.array([each.q for each in waiting]), steps)
-            for each, q in zip(waiting, there, strict=True):
-                each.q = q
+        if moving:
+            _step(moving, np.array(jacobians), np.array(errors), scale)
+            moving = [each for each in moving if each.failure is None]
 
 
-def _look(pursuit: Pursuit, kinematics: Kinematics) -> _Look:
-    """Make what computes error and Jacobian of the task for a target, at `kinematics`.
-
-    The task itself looks at a new target, and checks it.
-    """
-    robot, tracking = pursuit.robot, pursuit.tracking
-    plain = type(tracking) is PoseTask and tracking.frame in (None, robot.frame)
-    whole = robot.task_rows == ALL_ROWS
-    plain = plain and robot.task_axes == "body" and (whole or robot.task_rows == PLANE_ROWS)
-    rows, frame = np.array(robot.task_rows), robot.frame_id
-
-    def look(target: Any, *, new: bool) -> tuple[Array, Array]:
-        if new or not plain:
-            task = tracking.linearize(kinematics, target)
-            return task.error, task.J
-        error = pin.log6(kinematics.placement(frame).actInv(target)).np
-        J = kinematics.jacobian(frame)
-        return (error, J) if whole else (error[rows], J[rows])
-
-    return look
-
-
-def _steps(J: Array, error: Array, residual: Array, scale: Array) -> Array:
-    """Compute the steps (n, nv) of n pursuits.
-
-    They are Levenberg-Marquardt steps A^T (A A^T + mu I)^-1 e, A = J scale, with damping mu by the
-    squared error (Sugihara 2011).
+def _step(pursuits: list[Pursuit], J: Array, error: Array, scale: Array | None) -> None:
+    """Make a step of all pursuits, of joints by at most `LONGEST_STEP`.
 
     Args:
+        pursuits: n of them, of one kind.
         J: Jacobians of the task, (n, m, nv).
-        error: e, (n, m).
-        residual: its norms, (n,).
-        scale: displacement of each joint that counts like a radian, (nv,).
+        error: (n, m).
+        scale: displacement of each joint that counts like a radian, (nv,); None: 1.
     """
-    A = J * scale
-    M = A @ A.mT
-    M.reshape(len(M), -1)[:, :: M.shape[1] + 1] += (0.1 * residual**2 + 1e-12)[:, None]
-    y = np.linalg.solve(M, error[..., None])
-    steps: Array = scale * (y.mT @ A)[:, 0]
-    if not (np.abs(steps).max() <= LONGEST_STEP):
+    damping = np.array([0.1 * each.residual**2 + 1e-12 for each in pursuits])
+    try:
+        steps = _damped(J if scale is None else J * scale, error, damping)
+    except np.linalg.LinAlgError as failure:  # one is singular to rounding: which?
+        if len(pursuits) == 1:
+            pursuits[0].failure = failure
+            return
+        for k, each in enumerate(pursuits):
+            _step([each], J[k : k + 1], error[k : k + 1], scale)
+        return
+    if scale is not None:
+        steps *= scale
+    if not np.vdot(steps, steps) <= LONGEST_STEP**2:
         largest = np.maximum(np.abs(steps).max(axis=1), 1e-300)
         steps *= np.minimum(1.0, LONGEST_STEP / largest)[:, None]
+    there = moved(pursuits[0].robot, np.array([each.q for each in pursuits]), steps)
+    for each, q in zip(pursuits, there, strict=True):
+        each.q = q
+
+
+def _damped(A: Array, error: Array, damping: Array) -> Array:
+    """Compute Levenberg-Marquardt steps A^T (A A^T + mu I)^-1 e of n pursuits, (n, nv).
+
+    Args:
+        A: Jacobians of the task, (n, m, nv).
+        error: e, (n, m).
+        damping: mu, (n,).
+    """
+    M = A @ A.mT
+    M.reshape(len(M), -1)[:, :: M.shape[1] + 1] += damping[:, None]
+    y = np.linalg.solve(M, error[..., None])
+    steps: Array = (y.mT @ A)[:, 0]
     return steps
 
 
@@ -220,4 +242,7 @@ def configurations(
     """
     pursuit = Pursuit(robot, tracking, targets, q0, iterations)
     PURSUED_BY.get()(pursuit)
-    return pursuit.configurations()
+    if pursuit.failure is not None:
+        raise pursuit.failure
+    found: Array = np.array(pursuit.found)
+    return found

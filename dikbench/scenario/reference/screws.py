@@ -30,7 +30,7 @@ def exp3(vectors: Array) -> Array:
 def exp6(twists: Array) -> tuple[Array, Array]:
     """Compute rotations (n, 3, 3) and translations (n, 3) of twists (n, 6) (linear; angular)."""
     v, w = twists[:, :3], twists[:, 3:]
-    square, a, b, c = _coefficients(w)
+    _, a, b, c = _coefficients(w)
     along = c * np.einsum("ij,ij->i", w, v)
     translations = a[:, None] * v + b[:, None] * np.cross(w, v) + along[:, None] * w
     return exp3(w), translations
