@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from functools import partial
 from math import sqrt
 from typing import Any, Final
 
@@ -14,7 +15,6 @@ import pinocchio as pin
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.problem.tasks import OrientationTask, PoseTask, PositionTask, TrackingTask
-from dikbench.problem.tasks.task import check_rotation
 from dikbench.robots.kinematics import Kinematics, moved
 from dikbench.robots.robot import Robot
 from dikbench.robots.task_rows import ALL_ROWS, PLANE_ROWS
@@ -63,73 +63,38 @@ class Pursuit:
         """Whether the task is one of dikbench's on a frame, and not a plug-in's own."""
         return type(self.tracking) in OURS
 
-    def look(self, sight: _Sight) -> tuple[Array, Array] | None:
+    def look(
+        self, error_of: Callable[[Any], Array], jacobian: Callable[[], Array]
+    ) -> tuple[Array, Array] | None:
         """Look from the present configuration at targets, up to one that is not reached there.
 
+        Args:
+            error_of: the error (m,) of the task there for a target.
+            jacobian: of the task there, (m, nv), after its error.
+
         Returns:
-            Its error (m,) and the Jacobian (m, nv); None once all are reached.
+            The error for that target, and the Jacobian; None once all are reached.
 
         Raises:
             DikbenchError: if there were as many looks as are allowed.
         """
-        before = self.residual
+        looks, before = self.looks, self.residual
         while True:
-            if self.looks == self.iterations:
+            if looks == self.iterations:
                 raise DikbenchError(
                     f"robot {self.robot.name}: no posture found for the placement, residual "
                     f"{before:.2g}"
                 )
-            error = sight.error(self, self.targets[len(self.found)])
-            self.looks += 1
+            error = error_of(self.targets[len(self.found)])
+            looks += 1
             residual = sqrt(error.dot(error))
             if not (residual < THERE or (residual < SMALLEST_RESIDUAL and residual >= before)):
-                self.residual = residual
-                return error, sight.jacobian()
+                self.looks, self.residual = looks, residual
+                return error, jacobian()
             self.found.append(self.q)
-            self.looks, before = 0, float("inf")
+            looks, before = 0, float("inf")
             if len(self.found) == len(self.targets):
                 return None
-
-
-class _Sight:
-    """What pursuits of one kind see at a configuration: the error of their task, and its Jacobian.
-
-    Attributes:
-        kinematics: the robot at the configuration.
-    """
-
-    def __init__(self, pursuit: Pursuit) -> None:
-        robot, tracking = pursuit.robot, pursuit.tracking
-        self.kinematics = Kinematics(robot)
-        self._frame = robot.frame_id
-        self._rows = None if robot.task_rows == ALL_ROWS else np.array(robot.task_rows)
-        # What a pose task does, without what it checks at every step.
-        self._plain = (
-            type(tracking) is PoseTask
-            and tracking.frame in (None, robot.frame)
-            and robot.task_axes == "body"
-            and robot.task_rows in (ALL_ROWS, PLANE_ROWS)
-        )
-        self._J: Array | None = None
-
-    def error(self, pursuit: Pursuit, target: Any) -> Array:
-        """Compute the error for a target, (m,)."""
-        if not self._plain or not (pursuit.looks or pursuit.found):
-            task = pursuit.tracking.linearize(self.kinematics, target)
-            self._J = task.J
-            return task.error
-        if not pursuit.looks:
-            check_rotation("pose task", target.rotation)
-        self._J = None
-        error: Array = pin.log6(self.kinematics.placement(self._frame).actInv(target)).np
-        return error if self._rows is None else error[self._rows]
-
-    def jacobian(self) -> Array:
-        """Compute the Jacobian there, (m, nv)."""
-        if self._J is not None:
-            return self._J
-        J = self.kinematics.jacobian(self._frame)
-        return J if self._rows is None else J[self._rows]
 
 
 def pursue(pursuits: Iterable[Pursuit]) -> None:
@@ -156,24 +121,76 @@ def _kind(pursuit: Pursuit) -> object:
 
 def _pursue_alike(pursuits: list[Pursuit]) -> None:
     """Do pursuits of one kind: damped Gauss-Newton steps for all of them together."""
-    robot, sight, moving = pursuits[0].robot, _Sight(pursuits[0]), pursuits
+    robot, kinematics = pursuits[0].robot, Kinematics(pursuits[0].robot)
     scale = None if (robot.joint_scale == 1.0).all() else robot.joint_scale
-    while moving:
-        waiting, moving, errors, jacobians = moving, [], [], []
+    if _asks_for_the_pose(pursuits[0]):
+        error_of, jacobian = _pose_of(kinematics)
+        pursuits = [each for each in pursuits if _is_valid(each, kinematics)]
+    else:
+        error_of, jacobian = _task_of(pursuits[0].tracking, kinematics)
+    while pursuits:
+        waiting, pursuits, errors, jacobians = pursuits, [], [], []
         for each in waiting:
             try:
-                sight.kinematics.update(each.q)
-                seen = each.look(sight)
+                kinematics.update(each.q)
+                seen = each.look(error_of, jacobian)
             except Exception as failure:
                 each.failure = failure
                 continue
             if seen is not None:
-                moving.append(each)
+                pursuits.append(each)
                 errors.append(seen[0])
                 jacobians.append(seen[1])
-        if moving:
-            _step(moving, np.array(jacobians), np.array(errors), scale)
-            moving = [each for each in moving if each.failure is None]
+        if pursuits:
+            _step(pursuits, np.array(jacobians), np.array(errors), scale)
+            pursuits = [each for each in pursuits if each.failure is None]
+
+
+def _asks_for_the_pose(pursuit: Pursuit) -> bool:
+    """Say whether a task's error is the logarithm of a pose, or rows of it."""
+    robot, tracking = pursuit.robot, pursuit.tracking
+    if type(tracking) is not PoseTask or tracking.frame not in (None, robot.frame):
+        return False
+    return robot.task_axes == "body" and robot.task_rows in (ALL_ROWS, PLANE_ROWS)
+
+
+def _is_valid(pursuit: Pursuit, kinematics: Kinematics) -> bool:
+    """Let the task itself look at the first target once, and check its own and the target's."""
+    try:
+        kinematics.update(pursuit.q)
+        pursuit.tracking.linearize(kinematics, pursuit.targets[0])
+    except Exception as failure:
+        pursuit.failure = failure
+    return pursuit.failure is None
+
+
+def _pose_of(kinematics: Kinematics) -> tuple[Callable[[Any], Array], Callable[[], Array]]:
+    """Make what computes error and Jacobian of a pose task, without its checks at every step."""
+    robot, log6, placement = kinematics.robot, pin.log6, kinematics.placement
+    frame, rows = robot.frame_id, np.array(robot.task_rows)
+    if robot.task_rows == ALL_ROWS:
+        return (
+            lambda target: log6(placement(frame).actInv(target)).np,
+            partial(kinematics.jacobian, frame),
+        )
+    return (
+        lambda target: log6(placement(frame).actInv(target)).np[rows],
+        lambda: kinematics.jacobian(frame)[rows],
+    )
+
+
+def _task_of(
+    tracking: TrackingTask, kinematics: Kinematics
+) -> tuple[Callable[[Any], Array], Callable[[], Array]]:
+    """Make what computes error and Jacobian of any task."""
+    seen: list[Array] = []
+
+    def error_of(target: Any) -> Array:
+        task = tracking.linearize(kinematics, target)
+        seen[:] = [task.J]
+        return task.error
+
+    return error_of, lambda: seen[0]
 
 
 def _step(pursuits: list[Pursuit], J: Array, error: Array, scale: Array | None) -> None:

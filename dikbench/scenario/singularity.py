@@ -186,8 +186,8 @@ def _jacobian_derivatives(robot: Robot, q: Array) -> Array:
     """Compute dJ/dq_k of the task Jacobian, by central differences, (nv, m, nv)."""
     chain, step = robot.chain, STEP_RAD * np.eye(robot.nv)[robot.chain]
     derivatives = np.zeros((robot.nv, len(robot.task_rows), robot.nv))
-    q = np.broadcast_to(q, (len(chain), robot.nq))
-    ahead, behind = (along(robot, moved(robot, q, side))[0] for side in (step, -step))
+    beside = moved(robot, np.broadcast_to(q, (2 * len(chain), robot.nq)), np.vstack([step, -step]))
+    ahead, behind = np.split(along(robot, beside)[0], 2)
     derivatives[chain] = (ahead - behind) / (2 * STEP_RAD)
     return derivatives
 

@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.arrays import Array
+from dikbench.problem.tasks.task import ROTATION_ROUNDING, check_rotation
 from dikbench.robots.kinematics import Kinematics, placements
 from dikbench.robots.robot import Robot
 from dikbench.scenario.reference.screws import composed, exp6
@@ -70,10 +71,21 @@ class Reference:
         return rotations, np.array([X.translation for X in placed]).reshape(-1, 3)
 
     def targets(self, times: Array) -> list[Any]:
-        """Compute the placements (`pinocchio.SE3`) at nominal times (n,) [s]."""
-        if isinstance(self.placement, Placement):
-            return [pin.SE3(R, p) for R, p in zip(*self.placement.many(times), strict=True)]
-        return [self.placement(tau) for tau in times.tolist()]
+        """Compute the placements (`pinocchio.SE3`) at nominal times (n,) [s].
+
+        Raises:
+            DikbenchError: if one has no rotation.
+        """
+        if not isinstance(self.placement, Placement):
+            placed = [self.placement(tau) for tau in times.tolist()]
+            for X in placed:
+                check_rotation("reference", X.rotation)
+            return placed
+        R, p = self.placement.many(times)
+        off = np.abs(R.mT @ R - np.eye(3)).sum(axis=(1, 2)) + np.abs(np.linalg.det(R) - 1)
+        for k in np.flatnonzero(~(off < ROTATION_ROUNDING / 4)):
+            check_rotation("reference", R[k])
+        return [pin.SE3(*each) for each in zip(R, p, strict=True)]
 
 
 def target_at_rest(target: Any, duration: float) -> Reference:

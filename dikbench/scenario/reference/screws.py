@@ -14,8 +14,22 @@ SMALL: Final = 1e-3
 
 def exp3(vectors: Array) -> Array:
     """Compute the rotations (n, 3, 3) of rotation vectors (n, 3) [rad]."""
-    square, a, b, _ = _coefficients(vectors)
-    rotations = b[:, None, None] * (vectors[:, :, None] * vectors[:, None, :])
+    return _rotations(vectors, *_coefficients(vectors)[:3])
+
+
+def exp6(twists: Array) -> tuple[Array, Array]:
+    """Compute rotations (n, 3, 3) and translations (n, 3) of twists (n, 6) (linear; angular)."""
+    v, w = twists[:, :3], twists[:, 3:]
+    square, a, b, c = (each[:, None] for each in _coefficients(w))
+    (x, y, z), (i, j, k) = w.T, v.T
+    across = np.stack([y * k - z * j, z * i - x * k, x * j - y * i], axis=1)
+    along = c * (x * i + y * j + z * k)[:, None]
+    return _rotations(w, square[:, 0], a[:, 0], b[:, 0]), a * v + b * across + along * w
+
+
+def _rotations(vectors: Array, square: Array, a: Array, b: Array) -> Array:
+    """Compute I + a [r] + b [r]^2, (n, 3, 3), of rotation vectors r (n, 3)."""
+    rotations: Array = b[:, None, None] * (vectors[:, :, None] * vectors[:, None, :])
     x, y, z = (a[:, None] * vectors).T
     rotations[:, 2, 1] += x
     rotations[:, 1, 2] -= x
@@ -25,15 +39,6 @@ def exp3(vectors: Array) -> Array:
     rotations[:, 0, 1] -= z
     rotations.reshape(-1, 9)[:, ::4] += (1 - b * square)[:, None]
     return rotations
-
-
-def exp6(twists: Array) -> tuple[Array, Array]:
-    """Compute rotations (n, 3, 3) and translations (n, 3) of twists (n, 6) (linear; angular)."""
-    v, w = twists[:, :3], twists[:, 3:]
-    _, a, b, c = _coefficients(w)
-    along = c * np.einsum("ij,ij->i", w, v)
-    translations = a[:, None] * v + b[:, None] * np.cross(w, v) + along[:, None] * w
-    return exp3(w), translations
 
 
 def composed(
