@@ -111,11 +111,13 @@ def along(robot: Robot, q: Array, rows: Sequence[int] | None = None) -> tuple[Ar
         Two arrays (n, m, nv) and (n, 4, 4).
     """
     frame, kinematics = robot.frame_id, Kinematics(robot, robot.scratch)
-    jacobians, placed = np.empty((len(q), 6, robot.nv)), np.empty((len(q), 4, 4))
-    for k, each in enumerate(q):
+    bodies, frames = [], []
+    for each in q:
         kinematics.update(each)
-        placed[k] = kinematics.placement(frame).homogeneous
-        jacobians[k] = kinematics.jacobian(frame)
+        frames.append(kinematics.placement(frame).homogeneous)
+        bodies.append(kinematics.jacobian(frame))
+    jacobians = np.array(bodies).reshape(-1, 6, robot.nv)
+    placed = np.array(frames).reshape(-1, 4, 4)
     if robot.task_axes == "world":
         rotations = placed[:, None, :3, :3]
         jacobians = (rotations @ jacobians.reshape(-1, 2, 3, robot.nv)).reshape(jacobians.shape)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import partial
-from math import sqrt
+from math import inf, sqrt
 from typing import Any, Final
 
 import numpy as np
@@ -32,6 +32,13 @@ OURS: Final = (PoseTask, PositionTask, OrientationTask)
 """Tasks that differ in their targets only where model, frame and rows are the same."""
 
 
+Sight = tuple[Callable[[Any], Array], Callable[[], Array]]
+"""At a configuration: target -> error (m,) of a task, and, after that, its Jacobian (m, nv)."""
+
+Seen = tuple[Array, Array, Array, float]
+"""A configuration (nq,), error (m,) and Jacobian (m, nv) of a task there, damping of the step."""
+
+
 @dataclass(eq=False)
 class Pursuit:
     """The configurations that do a task at targets in their order, each solved from the last one.
@@ -39,62 +46,61 @@ class Pursuit:
     Attributes:
         robot: the robot.
         tracking: the task.
-        targets: where the task frame is to be (`pinocchio.SE3`), at least one.
-        q: the configuration to start from, then the present one, (nq,).
+        targets: where the task frame is to be (`pinocchio.SE3`).
+        q0: the configuration to start from, (nq,).
         iterations: largest number of looks at the error for a target.
         found: the configurations, (nq,) each.
         failure: why there are not as many as targets.
-        looks: number of looks for the present target.
-        residual: norm of the error (m, rad) at the last one.
     """
 
     robot: Robot
     tracking: TrackingTask
     targets: Sequence[Any]
-    q: Array
+    q0: Array
     iterations: int = 200
     found: list[Array] = field(default_factory=list)
     failure: Exception | None = None
-    looks: int = 0
-    residual: float = float("inf")
 
     @property
     def is_ours(self) -> bool:
         """Whether the task is one of dikbench's on a frame, and not a plug-in's own."""
         return type(self.tracking) in OURS
 
-    def look(
-        self, error_of: Callable[[Any], Array], jacobian: Callable[[], Array]
-    ) -> tuple[Array, Array] | None:
-        """Look from the present configuration at targets, up to one that is not reached there.
+    def walk(self, kinematics: Kinematics) -> Generator[Seen, Any, None]:
+        """Go from target to target, in steps that are made elsewhere, up to the last or a failure.
 
         Args:
-            error_of: the error (m,) of the task there for a target.
-            jacobian: of the task there, (m, nv), after its error.
+            kinematics: serves others too between the steps.
 
-        Returns:
-            The error for that target, and the Jacobian; None once all are reached.
-
-        Raises:
-            DikbenchError: if there were as many looks as are allowed.
+        Yields:
+            What is seen where a step is needed; the configuration after it, (nq,), is sent.
         """
-        looks, before = self.looks, self.residual
-        while True:
-            if looks == self.iterations:
+        try:
+            yield from self._walk(kinematics)
+        except Exception as failure:
+            self.failure = failure
+
+    def _walk(self, kinematics: Kinematics) -> Generator[Seen, Any, None]:
+        (error_of, jacobian), q = _sight(self, kinematics), self.q0
+        update, found, iterations = kinematics.update, self.found, range(self.iterations)
+        update(q)
+        for target in self.targets:
+            if not found:  # checks the task, and the target
+                self.tracking.linearize(kinematics, target)
+            residual = inf
+            for _ in iterations:
+                error = error_of(target)
+                before, residual = residual, sqrt(error.dot(error))
+                if residual < THERE or (residual < SMALLEST_RESIDUAL and residual >= before):
+                    break
+                q = yield q, error, jacobian(), 0.1 * residual**2 + 1e-12
+                update(q)
+            else:
                 raise DikbenchError(
                     f"robot {self.robot.name}: no posture found for the placement, residual "
-                    f"{before:.2g}"
+                    f"{residual:.2g}"
                 )
-            error = error_of(self.targets[len(self.found)])
-            looks += 1
-            residual = sqrt(error.dot(error))
-            if not (residual < THERE or (residual < SMALLEST_RESIDUAL and residual >= before)):
-                self.looks, self.residual = looks, residual
-                return error, jacobian()
-            self.found.append(self.q)
-            looks, before = 0, float("inf")
-            if len(self.found) == len(self.targets):
-                return None
+            found.append(q)
 
 
 def pursue(pursuits: Iterable[Pursuit]) -> None:
@@ -122,53 +128,31 @@ def _kind(pursuit: Pursuit) -> object:
 def _pursue_alike(pursuits: list[Pursuit]) -> None:
     """Do pursuits of one kind: damped Gauss-Newton steps for all of them together."""
     robot, kinematics = pursuits[0].robot, Kinematics(pursuits[0].robot)
-    scale = None if (robot.joint_scale == 1.0).all() else robot.joint_scale
-    if _asks_for_the_pose(pursuits[0]):
-        error_of, jacobian = _pose_of(kinematics)
-        pursuits = [each for each in pursuits if _is_valid(each, kinematics)]
-    else:
-        error_of, jacobian = _task_of(pursuits[0].tracking, kinematics)
-    while pursuits:
-        waiting, pursuits, errors, jacobians = pursuits, [], [], []
-        for each in waiting:
+    walks = [each.walk(kinematics) for each in pursuits]
+    there: Sequence[Any] = [None] * len(walks)
+    while walks:
+        seen: list[Seen] = []
+        going = []
+        for walk, q in zip(walks, there, strict=True):
             try:
-                kinematics.update(each.q)
-                seen = each.look(error_of, jacobian)
-            except Exception as failure:
-                each.failure = failure
+                seen.append(walk.throw(q) if isinstance(q, Exception) else walk.send(q))
+            except StopIteration:
                 continue
-            if seen is not None:
-                pursuits.append(each)
-                errors.append(seen[0])
-                jacobians.append(seen[1])
-        if pursuits:
-            _step(pursuits, np.array(jacobians), np.array(errors), scale)
-            pursuits = [each for each in pursuits if each.failure is None]
+            going.append(walk)
+        walks, there = going, _stepped(robot, seen) if seen else []
 
 
-def _asks_for_the_pose(pursuit: Pursuit) -> bool:
-    """Say whether a task's error is the logarithm of a pose, or rows of it."""
-    robot, tracking = pursuit.robot, pursuit.tracking
-    if type(tracking) is not PoseTask or tracking.frame not in (None, robot.frame):
-        return False
-    return robot.task_axes == "body" and robot.task_rows in (ALL_ROWS, PLANE_ROWS)
+def _sight(pursuit: Pursuit, kinematics: Kinematics) -> Sight:
+    """Make what looks at a task, at the configuration of `kinematics`.
 
-
-def _is_valid(pursuit: Pursuit, kinematics: Kinematics) -> bool:
-    """Let the task itself look at the first target once, and check its own and the target's."""
-    try:
-        kinematics.update(pursuit.q)
-        pursuit.tracking.linearize(kinematics, pursuit.targets[0])
-    except Exception as failure:
-        pursuit.failure = failure
-    return pursuit.failure is None
-
-
-def _pose_of(kinematics: Kinematics) -> tuple[Callable[[Any], Array], Callable[[], Array]]:
-    """Make what computes error and Jacobian of a pose task, without its checks at every step."""
-    robot, log6, placement = kinematics.robot, pin.log6, kinematics.placement
-    frame, rows = robot.frame_id, np.array(robot.task_rows)
-    if robot.task_rows == ALL_ROWS:
+    It does what a pose task does, but for the checks at every step.
+    """
+    robot, tracking, log6 = pursuit.robot, pursuit.tracking, pin.log6
+    rows, frame, placement = np.array(robot.task_rows), robot.frame_id, kinematics.placement
+    ours = type(tracking) is PoseTask and tracking.frame in (None, robot.frame)
+    if not ours or robot.task_axes != "body" or robot.task_rows not in (ALL_ROWS, PLANE_ROWS):
+        return _task_sight(tracking, kinematics)
+    if len(rows) == 6:
         return (
             lambda target: log6(placement(frame).actInv(target)).np,
             partial(kinematics.jacobian, frame),
@@ -179,62 +163,42 @@ def _pose_of(kinematics: Kinematics) -> tuple[Callable[[Any], Array], Callable[[
     )
 
 
-def _task_of(
-    tracking: TrackingTask, kinematics: Kinematics
-) -> tuple[Callable[[Any], Array], Callable[[], Array]]:
-    """Make what computes error and Jacobian of any task."""
-    seen: list[Array] = []
+def _task_sight(tracking: TrackingTask, kinematics: Kinematics) -> Sight:
+    """Make what looks at any task."""
+    J = np.empty(0)
 
     def error_of(target: Any) -> Array:
+        nonlocal J
         task = tracking.linearize(kinematics, target)
-        seen[:] = [task.J]
+        J = task.J
         return task.error
 
-    return error_of, lambda: seen[0]
+    return error_of, lambda: J
 
 
-def _step(pursuits: list[Pursuit], J: Array, error: Array, scale: Array | None) -> None:
-    """Make a step of all pursuits, of joints by at most `LONGEST_STEP`.
+def _stepped(robot: Robot, seen: list[Seen]) -> list[Array | Exception]:
+    """Make a step from each of several configurations, of joints by at most `LONGEST_STEP`.
 
-    Args:
-        pursuits: n of them, of one kind.
-        J: Jacobians of the task, (n, m, nv).
-        error: (n, m).
-        scale: displacement of each joint that counts like a radian, (nv,); None: 1.
+    It is the Levenberg-Marquardt step A^T (A A^T + mu I)^-1 e, with the task's error e, damping mu
+    by the squared error (Sugihara 2011), and A = J scale (see `Robot.joint_scale`).
+
+    Returns:
+        The configurations after it, (nq,) each; an error where one is singular to rounding.
     """
-    damping = np.array([0.1 * each.residual**2 + 1e-12 for each in pursuits])
+    q, error, J, damping = (np.array(each) for each in zip(*seen, strict=True))
+    scale = robot.joint_scale
+    A = J * scale
+    M = A @ A.mT
+    M.reshape(len(M), -1)[:, :: M.shape[1] + 1] += damping[:, None]
     try:
-        steps = _damped(J if scale is None else J * scale, error, damping)
-    except np.linalg.LinAlgError as failure:  # one is singular to rounding: which?
-        if len(pursuits) == 1:
-            pursuits[0].failure = failure
-            return
-        for k, each in enumerate(pursuits):
-            _step([each], J[k : k + 1], error[k : k + 1], scale)
-        return
-    if scale is not None:
-        steps *= scale
+        y = np.linalg.solve(M, error[..., None])
+    except np.linalg.LinAlgError as failure:  # of one, or of which of them?
+        return [failure] if len(M) == 1 else [_stepped(robot, [each])[0] for each in seen]
+    steps = scale * (y.mT @ A)[:, 0]
     if not np.vdot(steps, steps) <= LONGEST_STEP**2:
         largest = np.maximum(np.abs(steps).max(axis=1), 1e-300)
         steps *= np.minimum(1.0, LONGEST_STEP / largest)[:, None]
-    there = moved(pursuits[0].robot, np.array([each.q for each in pursuits]), steps)
-    for each, q in zip(pursuits, there, strict=True):
-        each.q = q
-
-
-def _damped(A: Array, error: Array, damping: Array) -> Array:
-    """Compute Levenberg-Marquardt steps A^T (A A^T + mu I)^-1 e of n pursuits, (n, nv).
-
-    Args:
-        A: Jacobians of the task, (n, m, nv).
-        error: e, (n, m).
-        damping: mu, (n,).
-    """
-    M = A @ A.mT
-    M.reshape(len(M), -1)[:, :: M.shape[1] + 1] += damping[:, None]
-    y = np.linalg.solve(M, error[..., None])
-    steps: Array = (y.mT @ A)[:, 0]
-    return steps
+    return list(moved(robot, q, steps))
 
 
 def _alone(pursuit: Pursuit) -> None:
