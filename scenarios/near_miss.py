@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from types import MappingProxyType
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -25,10 +26,12 @@ from dikbench.scenario import (
     Reference,
     Singularity,
     Variation,
+    along_screw,
     analyse,
     at_constant_rate,
     body_twist,
     joint_oracle,
+    load_robot,
     make_singular,
     oracle_motion,
     screw_path,
@@ -113,8 +116,7 @@ class NearMiss(Family):
             passage = _first_found(robot, self.miss, pace, change)
         else:
             known = _known(name, self.singularity)
-            seeded = pin.integrate(robot.model, pin.neutral(robot.model), np.array(known.posture))
-            where = _perturbed(robot, make_singular(robot, seeded), change)
+            where = _perturbed(robot, _nominal(self.robot, self.frame, known.posture), change)
             passage = _passage(robot, where, self.miss, pace, known.half_length)
         motion = passage.motion
         # At a fold the smallest singular value is about the root of the distance.
@@ -145,10 +147,18 @@ def _known(robot: str, singularity: SingularityName | Literal["auto"]) -> Singul
     return postures[singularity]
 
 
-def _perturbed(arm: Robot, q: Array, change: Perturbation) -> Singularity:
-    """Find the singularity next to the posture q (nq,) that the seed moves."""
-    nominal, moved = analyse(arm, q), change.posture(arm, q)
-    if moved is q:
+@lru_cache
+def _nominal(robot: str, frame: str | None, posture: tuple[float, ...]) -> Singularity:
+    """Find the singularity of a robot of the catalogue next to a posture (nv,)."""
+    arm = load_robot(robot, frame)
+    seeded = pin.integrate(arm.model, pin.neutral(arm.model), np.array(posture))
+    return analyse(arm, make_singular(arm, seeded))
+
+
+def _perturbed(arm: Robot, nominal: Singularity, change: Perturbation) -> Singularity:
+    """Find the singularity next to the one that the seed moves."""
+    moved = change.posture(arm, nominal.q)
+    if moved is nominal.q:
         return nominal
     return analyse(arm, make_singular(arm, moved)).oriented_like(nominal)
 
@@ -158,7 +168,7 @@ def _first_found(arm: Robot, miss: float, speed: float, change: Perturbation) ->
     reason = "none is inside the position limits"
     for q in singular_postures(arm, 2 * POSITION_MARGIN_RAD):
         try:
-            where = _perturbed(arm, q, change)
+            where = _perturbed(arm, analyse(arm, q), change)
         except DikbenchError:  # it loses two directions
             continue
         for half_length in HALF_LENGTHS[where.kind]:
@@ -237,13 +247,13 @@ def _folds(
     """Yield the path from inside to the edge and back, with each of two ways to bend."""
     inward, half = where.inward * where.lost, half_length / speed
 
-    def placement(tau: float) -> Any:
-        return where.placement * pin.exp6(pin.Motion((miss + speed * abs(tau - half)) * inward))
-
-    def velocity(tau: float) -> Array:
-        return (speed if tau >= half else -speed) * inward
-
-    reference = Reference(2 * half, placement, velocity)
+    reference = along_screw(
+        where.placement,
+        inward,
+        lambda tau: miss + speed * abs(tau - half),
+        lambda tau: speed if tau >= half else -speed,
+        2 * half,
+    )
     # To second order: curvature z^2 / 2 along n for a motion z of the joints.
     far = np.sqrt(2 * (miss + half_length) / where.curvature)
     for side in (1.0, -1.0):

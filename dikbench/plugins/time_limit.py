@@ -29,20 +29,51 @@ def time_limit(seconds: float, what: str) -> Iterator[None]:
     Raises:
         DikbenchError: if the time is over.
     """
-    can = hasattr(signal, "SIGVTALRM") and threading.current_thread() is threading.main_thread()
-    if not can or signal.getsignal(signal.SIGVTALRM) != signal.SIG_DFL:
+    if _handler() != signal.SIG_DFL:
         yield
         return
-
-    def end(number: int, frame: FrameType | None) -> None:
-        raise _OutOfTime
-
-    signal.signal(signal.SIGVTALRM, end)
-    signal.setitimer(signal.ITIMER_VIRTUAL, seconds)
+    _start(seconds)
     try:
         yield
     except _OutOfTime:
         raise DikbenchError(f"{what} takes longer than {seconds:g} s of processor time") from None
     finally:
-        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
-        signal.signal(signal.SIGVTALRM, signal.SIG_DFL)
+        _stop()
+
+
+@contextmanager
+def others_may_run() -> Iterator[None]:
+    """Stop the clock of the block around this one, if there is a limit, and start it again after.
+
+    What runs meanwhile may have a limit of its own.
+    """
+    if _handler() is not _end:
+        yield
+        return
+    left = _stop()
+    try:
+        yield
+    finally:
+        _start(left)
+
+
+def _handler() -> object:
+    """Return what is done when time is over; None where there cannot be a limit."""
+    can = hasattr(signal, "SIGVTALRM") and threading.current_thread() is threading.main_thread()
+    return signal.getsignal(signal.SIGVTALRM) if can else None
+
+
+def _start(seconds: float) -> None:
+    signal.signal(signal.SIGVTALRM, _end)
+    signal.setitimer(signal.ITIMER_VIRTUAL, seconds)
+
+
+def _stop() -> float:
+    """Stop the clock and return the time that was left [s]."""
+    left, _ = signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+    signal.signal(signal.SIGVTALRM, signal.SIG_DFL)
+    return left
+
+
+def _end(number: int, frame: FrameType | None) -> None:
+    raise _OutOfTime

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -106,3 +107,44 @@ def placements(robot: Robot, frame: int, q: Array) -> Array:
     found[:, :3, 3] = np.frombuffer(b"".join(translations)).reshape(-1, 3)
     found[:, 3, 3] = 1.0
     return found
+
+
+def along(robot: Robot, q: Array, rows: Sequence[int] | None = None) -> tuple[Array, Array]:
+    """Compute Jacobians and placements of the task frame at configurations (n, nq).
+
+    Args:
+        robot: the robot.
+        q: the configurations.
+        rows: see `Kinematics.task_jacobian`.
+
+    Returns:
+        Two arrays (n, m, nv) and (n, 4, 4).
+    """
+    frame, kinematics = robot.frame_id, Kinematics(robot, robot.scratch)
+    bodies, frames = [], []
+    for each in q:
+        kinematics.update(each)
+        frames.append(kinematics.placement(frame).homogeneous)
+        bodies.append(kinematics.jacobian(frame))
+    jacobians = np.array(bodies).reshape(-1, 6, robot.nv)
+    placed = np.array(frames).reshape(-1, 4, 4)
+    if robot.task_axes == "world":
+        rotations = placed[:, None, :3, :3]
+        jacobians = (rotations @ jacobians.reshape(-1, 2, 3, robot.nv)).reshape(jacobians.shape)
+    return jacobians[:, list(robot.task_rows if rows is None else rows)], placed
+
+
+def differences(robot: Robot, q: Array) -> Array:
+    """Compute the displacements from each configuration of (n, nq) to the next, (n - 1, nv)."""
+    if robot.nq == robot.nv:
+        return np.diff(q, axis=0)
+    between = [pin.difference(robot.model, here, there) for here, there in pairwise(q)]
+    return np.array(between).reshape(-1, robot.nv)
+
+
+def moved(robot: Robot, q: Array, steps: Array) -> Array:
+    """Move configurations (n, nq) by displacements (n, nv)."""
+    if robot.nq == robot.nv:
+        return q + steps
+    there = [pin.integrate(robot.model, *each) for each in zip(q, steps, strict=True)]
+    return np.array(there).reshape(-1, robot.nq)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
@@ -14,6 +16,7 @@ from dikbench.plugins.building import make_formulation, make_plant, make_scenari
 from dikbench.problem.posing import pose_problem
 from dikbench.problem.problem import (
     DikProblem,
+    Formulation,
     program_of,
     refusal_of,
     sees_constraints,
@@ -24,10 +27,11 @@ from dikbench.robots.kinematics import Kinematics
 from dikbench.run.provenance import environment
 from dikbench.run.worker_process import restore_process
 from dikbench.scenario.oracle import ORACLES
+from dikbench.scenario.plant import Plant
 from dikbench.scenario.scenario import Scenario
 from dikbench.selector import Selector
 from dikbench.simulation.clock import ReferenceMode
-from dikbench.simulation.closed_loop import simulate
+from dikbench.simulation.closed_loop import Run, simulate
 from dikbench.simulation.oracle_formulation import oracle_of
 from dikbench.simulation.status import Status
 from dikbench.solvers.catalogue.back_ends import parse_solver
@@ -67,7 +71,8 @@ def row_without_run(trial: Trial, status: Status, message: str) -> TrialRow:
 
 
 @lru_cache(maxsize=4)
-def _environment(commit: str | None, command: str) -> TrialRow:
+def described(commit: str | None, command: str) -> TrialRow:
+    """Describe this process (see `environment`), once."""
     return environment(commit, command)
 
 
@@ -89,9 +94,19 @@ def work(
     Raises:
         CannotStore: if the trace cannot be written.
     """
+    row = attempted(trial, lambda: run_trial(trial, trace, policy))
+    return row, described(commit, command)
+
+
+def attempted(trial: Trial, run: Callable[[], TrialRow]) -> TrialRow:
+    """Run a trial; any failure of its plug-ins becomes a status, and the process is restored.
+
+    Raises:
+        CannotStore: if the trace cannot be written.
+    """
     restore_process()
     try:
-        row = run_trial(trial, trace, policy)
+        row = run()
     except CannotStore:
         raise
     except MemoryError as error:
@@ -103,30 +118,46 @@ def work(
         reason = f"the formulation asked the process to end: {type(error).__name__}"
         row = row_without_run(trial, Status.CRASHED, reason)
     restore_process()
-    return row, _environment(commit, command)
+    return row
 
 
-def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "all") -> TrialRow:
-    """Run one trial.
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A trial that can run, and what it consists of.
 
-    Args:
+    Attributes:
         trial: the cell.
-        trace: file for its trace, or None.
-        policy: whether the trace is kept.
+        scenario: its case.
+        formulation: the formulation; an oracle of this run alone.
+        plant: the measurement and the drive.
+        sight: what the formulation sees of the problem (see `SEES`).
+    """
 
-    Returns:
-        Its row: keys, status, message, number of steps, every metric, the outcome; what the
-        formulation sees of the problem, where there is something to see; `wall_time_s` of the run
-        and `control_time_s` in kinematics, formulation and solver.
+    trial: Trial
+    scenario: Scenario
+    formulation: Formulation
+    plant: Plant
+    sight: Mapping[str, bool | None]
+
+    @property
+    def mode(self) -> ReferenceMode:
+        """What advances the reference."""
+        return "path" if self.trial.reference == "path" else "time"
+
+    def solve(self) -> CheckedSolve:
+        """Make a fresh solver."""
+        if self.trial.formulation.name in ORACLES:
+            return make_solve(None, None)
+        return solve_of(self.trial.formulation, self.trial.solver)
+
+
+def prepare(trial: Trial, scenario: Scenario) -> Prepared | TrialRow:
+    """Make what a trial consists of, or its row where it cannot run.
 
     Raises:
-        CannotStore: if the trace cannot be written.
+        DikbenchError: if the scenario poses no problem.
     """
-    try:
-        scenario = scenario_of(trial.scenario, trial.seed)
-        problem = first_problem(scenario)
-    except DikbenchError as error:
-        return row_without_run(trial, Status.SKIPPED, str(error))
+    problem = first_problem(scenario)
     if trial.reference == "path" and not scenario.reference.moving:
         reason = "the scenario has no path that could wait for the robot"
         return row_without_run(trial, Status.SKIPPED, reason)
@@ -150,32 +181,74 @@ def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "al
         if sight["sees_constraints"] is False:
             row["outcome"] = row["decided_before"] = Outcome.DOES_NOT_SEE.value
         return row
-    plant = make_plant(trial.plant)
-    mode: ReferenceMode = "path" if trial.reference == "path" else "time"
-    start = perf_counter()
+    return Prepared(trial, scenario, formulation, make_plant(trial.plant), sight)
+
+
+def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "all") -> TrialRow:
+    """Run one trial.
+
+    Args:
+        trial: the cell.
+        trace: file for its trace, or None.
+        policy: whether the trace is kept.
+
+    Returns:
+        Its row: keys, status, message, number of steps, every metric, the outcome; what the
+        formulation sees of the problem, where there is something to see; `wall_time_s` of the run
+        and `control_time_s` in kinematics, formulation and solver.
+
+    Raises:
+        CannotStore: if the trace cannot be written.
+    """
+    try:
+        found = prepare(trial, scenario_of(trial.scenario, trial.seed))
+    except DikbenchError as error:
+        return row_without_run(trial, Status.SKIPPED, str(error))
+    return run_prepared(found, trace, policy) if isinstance(found, Prepared) else found
+
+
+def run_prepared(ready: Prepared, trace: Path | None, policy: TracePolicy) -> TrialRow:
+    """Run a trial alone (see `run_trial`)."""
+    start, trial = perf_counter(), ready.trial
     run = simulate(
-        scenario,
-        formulation,
-        make_solve(None, None) if oracle else solve_of(trial.formulation, trial.solver),
-        plant,
-        mode,
-        trial.seed,
+        ready.scenario, ready.formulation, ready.solve(), ready.plant, ready.mode, trial.seed
     )
-    if trace is not None and (
-        policy == "all" or (policy == "failures" and run.status is not Status.OK)
-    ):
-        _keep(run.trace.save, trace)
-    # Noise makes the Jacobians that the formulation had differ from the true motion's.
-    jacobians = None if plant.noise else run.jacobians
-    metrics = measure([Measured(run.trace, scenario, jacobians, run.status)])[0]
-    return {
-        **row_without_run(trial, run.status, run.message),
-        "steps": run.trace.steps,
-        **metrics,
-        **sight,
-        "wall_time_s": perf_counter() - start,
-        "control_time_s": (run.kinematics_ns + run.formulation_ns) / 1e9,
-    }
+    [row] = rows_of([ready], [run], [trace], policy)
+    row["wall_time_s"] = perf_counter() - start
+    row["control_time_s"] = (run.kinematics_ns + run.formulation_ns) / 1e9
+    return row
+
+
+def rows_of(
+    ready: Sequence[Prepared],
+    runs: Sequence[Run],
+    traces: Sequence[Path | None],
+    policy: TracePolicy,
+) -> list[TrialRow]:
+    """Make the rows of runs that are finished, without times, and keep their traces.
+
+    Raises:
+        CannotStore: if a trace cannot be written.
+    """
+    for run, trace in zip(runs, traces, strict=True):
+        if trace is not None and (
+            policy == "all" or (policy == "failures" and run.status is not Status.OK)
+        ):
+            _keep(run.trace.save, trace)
+    measured = [
+        # Noise makes the Jacobians that the formulation had differ from the true motion's.
+        Measured(run.trace, p.scenario, None if p.plant.noise else run.jacobians, run.status)
+        for p, run in zip(ready, runs, strict=True)
+    ]
+    return [
+        {
+            **row_without_run(p.trial, run.status, run.message),
+            "steps": run.trace.steps,
+            **metrics,
+            **p.sight,
+        }
+        for p, run, metrics in zip(ready, runs, measure(measured), strict=True)
+    ]
 
 
 def first_problem(scenario: Scenario) -> DikProblem:

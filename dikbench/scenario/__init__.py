@@ -66,7 +66,14 @@ from dikbench.scenario.oracle import (
 )
 from dikbench.scenario.reference.curves import circle, lemniscate, plane_of
 from dikbench.scenario.reference.pose_file import PoseFile, read_poses
-from dikbench.scenario.reference.reference import Reference, joint_path, screw_path, target_at_rest
+from dikbench.scenario.reference.reference import (
+    Placement,
+    Reference,
+    along_screw,
+    joint_path,
+    screw_path,
+    target_at_rest,
+)
 from dikbench.scenario.reference.spline import spline_through
 from dikbench.scenario.reference.waypoints import held, through
 from dikbench.scenario.scenario import Scenario
@@ -108,6 +115,7 @@ __all__ = [
     "OrientationTask",
     "Parameters",
     "Perturbation",
+    "Placement",
     "PoseFile",
     "PoseTask",
     "PositionTask",
@@ -125,6 +133,7 @@ __all__ = [
     "TrackingTask",
     "TrackingTogether",
     "Variation",
+    "along_screw",
     "analyse",
     "at_constant_rate",
     "body_twist",

@@ -21,7 +21,7 @@ from dikbench.robots.robot import Robot
 from dikbench.robots.task_rows import ALL_ROWS, rows_in_words
 from dikbench.scenario.certificate import Claim
 from dikbench.scenario.oracle import POSE, OracleMotion, measure_motion, oracle_motion
-from dikbench.scenario.reference.reference import Reference
+from dikbench.scenario.reference.reference import Reference, along_screw
 from dikbench.scenario.steps import steps_in
 
 DEPENDENT = 1e-6
@@ -271,11 +271,7 @@ def motion_of_a_step(robot: Robot, q0: Array, twist: Array, gain: float) -> Orac
         gain: gain of the tracking task [1/s].
     """
     start = placement_of(robot, q0)
-    straight = Reference(
-        1 / gain,
-        lambda tau: start * pin.exp6(pin.Motion(gain * tau * twist)),
-        lambda tau: gain * twist,
-    )
+    straight = along_screw(start, twist, lambda tau: gain * tau, lambda tau: gain, 1 / gain)
     return oracle_motion(robot, straight, q0, np.linspace(0.0, straight.duration, 51))
 
 

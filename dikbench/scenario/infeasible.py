@@ -79,7 +79,7 @@ def _beyond_the_reach(scenario: Scenario, times: Array) -> str:
     whole_pose = _asks_for_the_whole_pose(scenario)
     if not whole_pose and not isinstance(scenario.tracking, PositionTask):
         return ""
-    reach = [robot.reach_of(reference.placement(tau)) for tau in times]
+    reach = np.linalg.norm(reference.placements(times)[1] - robot.shoulder, axis=1)
     tried = [float(times[int(np.argmax(reach))])]
     if scenario.motion is not None:
         within = scenario.motion.instants <= times[-1]

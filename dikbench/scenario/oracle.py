@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, Final
 
 import numpy as np
-import pinocchio as pin
 
 from dikbench.arrays import Array
-from dikbench.errors import DikbenchError
 from dikbench.problem.tasks import PoseTask, TrackingTask
-from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.kinematics import along, differences, placements
 from dikbench.robots.robot import Robot
+from dikbench.scenario.placing import configurations
 from dikbench.scenario.reference.reference import Reference
 
 ORACLE = "oracle"
@@ -26,6 +25,9 @@ ORACLES = (ORACLE, SLOWED_ORACLE)
 """Formulations of the harness itself, which know the joint motion and do not compete."""
 
 POSE = PoseTask()
+
+SMALL_SQUARE: Final = 1e-4
+"""Share of the largest eigenvalue below which rounding is seen in the root of the smallest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +53,15 @@ class OracleMotion:
     margin: Array
     reach: Array
     exact: Callable[[float], Array] | None = None
+    _placed: tuple[Any, int, Array] | None = field(default=None, init=False, repr=False)
+
+    def placements(self, robot: Robot) -> Array:
+        """Return the placements of the robot's task frame at the samples, (k + 1, 4, 4)."""
+        known = self._placed
+        if known is None or known[0] is not robot.model or known[1] != robot.frame_id:
+            known = robot.model, robot.frame_id, placements(robot, robot.frame_id, self.q)
+            object.__setattr__(self, "_placed", known)
+        return known[2]
 
     @property
     def peak_speed_ratio(self) -> float:
@@ -82,27 +93,8 @@ def solve_placement(
     Raises:
         DikbenchError: if the residual (m, rad) does not fall below 1e-9.
     """
-    kinematics, step = Kinematics(robot, robot.scratch), np.zeros(robot.nv)
-    q = seed
-    error = np.inf
-    for _ in range(iterations):
-        kinematics.update(q)
-        task = tracking.linearize(kinematics, target)
-        e, J = task.error, task.J
-        moving = J.any(axis=0)  # a few joints of a humanoid's hundred
-        scale = robot.joint_scale[moving]
-        J = (J if moving.all() else J[:, moving]) * scale
-        before, error = error, float(np.linalg.norm(e))
-        if error < 1e-12 or (error < 1e-9 and error >= before):
-            return q  # there, up to rounding
-        H = J.T @ J
-        H.flat[:: len(H) + 1] += 0.1 * error**2 + 1e-12
-        step[moving] = scale * np.linalg.solve(H, J.T @ e)
-        largest = float(np.abs(step).max())
-        q = pin.integrate(robot.model, q, step * min(1.0, 0.3 / max(largest, 1e-300)))
-    raise DikbenchError(
-        f"robot {robot.name}: no posture found for the placement, residual {error:.2g}"
-    )
+    q: Array = configurations(robot, [target], seed, tracking, iterations)[0]
+    return q
 
 
 def follow(
@@ -122,10 +114,8 @@ def follow(
     Raises:
         DikbenchError: if a sample cannot be reached.
     """
-    q = [q0]
-    for tau in instants[1:]:
-        q.append(solve_placement(robot, reference.placement(tau), q[-1], tracking=tracking))
-    return np.array(q)
+    targets = reference.targets(instants[1:])
+    return np.vstack([q0, *configurations(robot, targets, q0, tracking)])
 
 
 def oracle_motion(
@@ -155,23 +145,29 @@ def measure_motion(
     exact: Callable[[float], Array] | None = None,
 ) -> OracleMotion:
     """Measure a joint motion (k + 1, nq) at its instants (k + 1,) [s] (see `OracleMotion`)."""
-    model, rows = robot.model, tracking.rows(robot)
-    periods = np.diff(instants)
-    v = np.array(
-        [pin.difference(model, q[k], q[k + 1]) / period for k, period in enumerate(periods)]
-    ).reshape(len(periods), robot.nv)
-    kinematics = Kinematics(robot)
-    jacobians, reach = np.empty((len(q), len(rows), robot.nv)), []
-    for k, sample in enumerate(q):
-        kinematics.update(sample)
-        jacobians[k] = kinematics.task_jacobian(rows)
-        reach.append(robot.reach_of(kinematics.placement(robot.frame_id)))
-    sigma = np.linalg.svd(jacobians, compute_uv=False)[:, -1].astype(np.float64, copy=False)
+    v = differences(robot, q) / np.diff(instants)[:, None]
+    jacobians, placed = along(robot, q, tracking.rows(robot))
+    reach = np.linalg.norm(placed[:, :3, 3] - robot.shoulder, axis=1)
+    sigma = _smallest_singular_values(jacobians)
     limit = robot.limits.velocity
     ratio = np.zeros(len(v)) if limit is None else limit.usage(v).max(axis=1)
-    return OracleMotion(
-        instants, q, v, sigma, ratio, _position_margins(robot, q), np.array(reach), exact
-    )
+    margins = _position_margins(robot, q)
+    motion = OracleMotion(instants, q, v, sigma, ratio, margins, reach, exact)
+    object.__setattr__(motion, "_placed", (robot.model, robot.frame_id, placed))
+    return motion
+
+
+def _smallest_singular_values(J: Array) -> Array:
+    """Compute the smallest singular value of each of n Jacobians (n, m, nv), (n,).
+
+    Where it is not small, it is as exact, and quicker, from the eigenvalues of J J^T.
+    """
+    squares = np.linalg.eigvalsh(J @ J.mT if J.shape[1] <= J.shape[2] else J.mT @ J)
+    sigma: Array = np.sqrt(np.maximum(squares[:, 0], 0.0))
+    small = ~(squares[:, 0] > SMALL_SQUARE * squares[:, -1])
+    if small.any():
+        sigma[small] = np.linalg.svd(J[small], compute_uv=False)[:, -1]
+    return sigma
 
 
 def position_margin(robot: Robot, q: Array) -> float:

@@ -15,7 +15,7 @@ import pinocchio as pin
 from dikbench.arrays import Array, Mask, read_only
 from dikbench.parameters import Parameters, Range
 from dikbench.problem.constraints import CollisionConstraint, TorqueConstraint
-from dikbench.problem.tasks.many_tasks import integrated
+from dikbench.robots.kinematics import moved
 from dikbench.robots.limits import Limits
 from dikbench.scenario.scenario import Scenario
 from dikbench.scenario.violation import Violation, broken_limit, collision
@@ -153,7 +153,7 @@ class ManyStarted:
             return q
         nv = self._robot.nv
         errors = np.array([each.normal(0.0, self._plant.noise, nv) for each in self._random])
-        return integrated(self._robot, q, errors)
+        return moved(self._robot, q, errors)
 
     def apply(self, v: Array, limits: Limits) -> Array:
         """Send commands (N, nv), and return the velocities with which the robots move."""

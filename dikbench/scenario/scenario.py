@@ -155,8 +155,16 @@ class Scenario:
     @cached_property
     def target_arrays(self) -> tuple[Array, Array]:
         """Rotations (n + 1, 3, 3) and translations (n + 1, 3) of `targets`."""
-        rotations = np.array([X.rotation for X, _ in self.targets])
-        return rotations, np.array([X.translation for X, _ in self.targets])
+        return self.reference.placements(self._target_times)
+
+    @cached_property
+    def _target_times(self) -> Array:
+        """Nominal times of `targets`, (n + 1,) [s]: a reference that moves rests at its end."""
+        times = self.dt * np.arange(self.steps + 1, dtype=float)
+        end = self.reference.duration
+        return (
+            np.where(end - times < REST_ROUNDING_S, end, times) if self.reference.moving else times
+        )
 
     @cached_property
     def path(self) -> ReferencePath | None:

@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.kinematics import Kinematics, along, moved
 from dikbench.robots.robot import Robot
 from dikbench.scenario.oracle import position_margin
 
@@ -184,14 +184,11 @@ def singular_postures(robot: Robot, margin: float, attempts: int = 24) -> Iterat
 
 def _jacobian_derivatives(robot: Robot, q: Array) -> Array:
     """Compute dJ/dq_k of the task Jacobian, by central differences, (nv, m, nv)."""
-    nv = robot.nv
-    kinematics, unit = Kinematics(robot), np.eye(nv)
-    derivatives = np.zeros((nv, len(robot.task_rows), nv))
-    for k in robot.chain:
-        kinematics.update(pin.integrate(robot.model, q, STEP_RAD * unit[k]))
-        ahead = kinematics.task_jacobian()
-        kinematics.update(pin.integrate(robot.model, q, -STEP_RAD * unit[k]))
-        derivatives[k] = (ahead - kinematics.task_jacobian()) / (2 * STEP_RAD)
+    chain, step = robot.chain, STEP_RAD * np.eye(robot.nv)[robot.chain]
+    derivatives = np.zeros((robot.nv, len(robot.task_rows), robot.nv))
+    beside = moved(robot, np.broadcast_to(q, (2 * len(chain), robot.nq)), np.vstack([step, -step]))
+    ahead, behind = np.split(along(robot, beside)[0], 2)
+    derivatives[chain] = (ahead - behind) / (2 * STEP_RAD)
     return derivatives
 
 

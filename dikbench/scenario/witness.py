@@ -11,7 +11,6 @@ import numpy as np
 from dikbench.arrays import Array, Mask
 from dikbench.problem.constraints import CollisionConstraint, Constraint, TorqueConstraint
 from dikbench.problem.embedding import Embedding
-from dikbench.robots.kinematics import placements
 from dikbench.robots.robot import Robot
 from dikbench.scenario.oracle import OracleMotion
 from dikbench.scenario.reference.reference import Reference
@@ -108,13 +107,10 @@ def does_the_task(
     robot: Robot, motion: OracleMotion, reference: Reference, embedding: Embedding
 ) -> bool:
     """Say whether the samples of a joint motion are on the path, or its end at a target at rest."""
-    times, q = (
-        (motion.instants, motion.q) if reference.moving else ([reference.duration], motion.q[-1:])
-    )
-    wanted = np.array([reference.placement(tau).homogeneous for tau in times])
-    made, (a, b) = placements(robot, robot.frame_id, q), (slice(0, 3), 3)
-    targets = wanted[:, a, a], wanted[:, a, b]
-    off = embedding.beside((made[:, a, a], made[:, a, b]), targets) - embedding.points(*targets)
+    last = slice(None) if reference.moving else slice(-1, None)
+    times = motion.instants if reference.moving else np.array([reference.duration])
+    targets, made = reference.placements(times), motion.placements(robot)[last]
+    off = embedding.beside((made[:, :3, :3], made[:, :3, 3]), targets) - embedding.points(*targets)
     return bool(np.linalg.norm(off, axis=1).max() <= OFF_PATH_M)
 
 

@@ -17,13 +17,13 @@ from dikbench.arrays import Array, Indices, Mask
 from dikbench.problem.problem import DikProblem, Formulation, is_batched
 from dikbench.problem.tasks.many_tasks import (
     ManyTargets,
-    integrated,
     kind_of_task,
     kind_of_tracking,
     linearize_task,
     linearize_tracking,
     row_of,
 )
+from dikbench.robots.kinematics import moved
 from dikbench.robots.limits import JointLimits, Limits
 from dikbench.robots.many_kinematics import ManyKinematics
 from dikbench.scenario.plant import ManyStarted, Plant, ProtectiveStop, Step
@@ -226,7 +226,7 @@ class _Lockstep:
         self.commanded[running, k], self.applied[running, k] = v, applied
         self.status[running, k], self.relaxed[running, k] = status, relaxed
         before, v_before = self.q, self.v_prev
-        self.q = integrated(self.robot, self.q, applied * self.dt)
+        self.q = moved(self.robot, self.q, applied * self.dt)
         self.v_prev = applied
         self.clock.advance(self.q)
         self.taken[running] += 1

@@ -154,24 +154,10 @@ def row_of(many: LinearizedTask, k: int, task: Any, robot: Robot, relative: Any)
 
 def differences(robot: Robot, q: Array, targets: Array) -> Array:
     """Compute the tangent vectors (N, nv) that lead from q (N, nq) to targets (N, nq)."""
-    if has_plain_coordinates(robot):
+    if robot.nq == robot.nv:
         return targets - q
     model = robot.model
     return np.array([pin.difference(model, a, b) for a, b in zip(q, targets, strict=True)])
-
-
-def integrated(robot: Robot, q: Array, steps: Array) -> Array:
-    """Move configurations (N, nq) by tangent vectors (N, nv)."""
-    if has_plain_coordinates(robot):
-        return q + steps
-    model = robot.model
-    return np.array([pin.integrate(model, a, b) for a, b in zip(q, steps, strict=True)])
-
-
-def has_plain_coordinates(robot: Robot) -> bool:
-    """Whether each coordinate is that of a joint with one degree of freedom."""
-    joints = list(robot.model.joints)[1:]
-    return all(joint.nq == joint.nv == 1 for joint in joints) and len(joints) == robot.nv
 
 
 def product3(A: Array, B: Array) -> Array:

@@ -10,7 +10,8 @@ import pinocchio as pin
 
 from dikbench.arrays import Array
 from dikbench.robots.robot import Robot
-from dikbench.scenario.reference.reference import Reference
+from dikbench.scenario.reference.reference import Placed, Placement, Reference
+from dikbench.scenario.reference.screws import exp3
 
 WORLD_YZ_PLANE: Final = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 """The world's y-z plane: its two axes as columns, (3, 2)."""
@@ -82,10 +83,13 @@ def lemniscate(
 
 def _curve(
     given: tuple[Any, float, float, Array, float],
-    offset: Callable[[float], Array],
+    offset: Callable[[Any], Array],
     tangent: Callable[[float], Array],
 ) -> Reference:
-    """Build a curve from its offset from `start` at an angle, (2,) [m], and its derivative."""
+    """Build a curve from its offset from `start`, (2,) [m], and its derivative, at an angle.
+
+    The offset is also that at each of several angles (n,), (2, n).
+    """
     start, period, laps, plane, turn = given
     first: Array = start.rotation.copy()
     origin = start.translation.copy()
@@ -102,10 +106,15 @@ def _curve(
         angle = rate * tau
         return pin.SE3(rotation(angle), origin + plane @ offset(angle))
 
+    def many(times: Array) -> Placed:
+        angles = rate * times
+        turned = exp3(turn * np.sin(angles)[:, None] * normal) @ first
+        return turned, origin + offset(angles).T @ plane.T
+
     def velocity(tau: float) -> Array:
         angle = rate * tau
         world = np.array([plane @ tangent(angle), turn * np.cos(angle) * normal])
         twist: Array = rate * (world @ rotation(angle)).ravel()
         return twist
 
-    return Reference(laps * period, placement, velocity, period=period)
+    return Reference(laps * period, Placement(placement, many), velocity, period=period)

@@ -216,10 +216,7 @@ def embedded_path(reference: Reference, embedding: Embedding, dt: float) -> Embe
     end = reference.duration
     count = int(np.clip(SAMPLES_PER_PERIOD * round(end / dt), FEWEST_SAMPLES, MOST_SAMPLES))
     times = np.linspace(0.0, end, count + 1)
-    placements = [reference.placement(tau) for tau in times.tolist()]
-    points = embedding.points(
-        np.array([X.rotation for X in placements]), np.array([X.translation for X in placements])
-    )
+    points = embedding.points(*reference.placements(times))
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     lap = reference.first_lap + reference.period
     once = min(int(np.searchsorted(times, lap - SAME_INSTANT_S)), len(times) - 1)

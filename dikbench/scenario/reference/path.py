@@ -157,12 +157,8 @@ def _samples(reference: Reference, dt: float) -> tuple[Array, Array]:
     """Sample times (f,) [s] and points (f, 3) [m], so that chords are within `CHORD_ERROR_M`."""
     end = reference.duration
 
-    def at(times: Array) -> Array:
-        points = [reference.placement(tau).translation for tau in times.tolist()]
-        return np.array(points).reshape(-1, 3)
-
     times = np.linspace(0.0, end, max(2, int(np.ceil(end / dt))) + 1)
-    points = at(times)
+    points = reference.placements(times)[1]
     bends = np.linalg.norm(np.diff(points, 2, axis=0), axis=1) / 8  # how far the chord is off
     worst = np.maximum(np.append(bends, 0.0), np.insert(bends, 0, 0.0))
     parts = np.clip(np.ceil(np.sqrt(worst / CHORD_ERROR_M)), 1, MAX_SAMPLES_PER_PERIOD).astype(int)
@@ -172,7 +168,7 @@ def _samples(reference: Reference, dt: float) -> tuple[Array, Array]:
     filled = np.empty((len(finer), 3))
     known = np.append(share == 0, True)
     filled[known] = points
-    filled[~known] = at(finer[~known])
+    filled[~known] = reference.placements(finer[~known])[1]
     return finer, filled
 
 

@@ -11,8 +11,9 @@ import pinocchio as pin
 from scipy.linalg import solve_banded
 
 from dikbench.arrays import Array, Mask
-from dikbench.scenario.reference.reference import Reference
-from dikbench.scenario.reference.waypoints import segment_at
+from dikbench.scenario.reference.reference import Placed, Placement, Reference
+from dikbench.scenario.reference.screws import exp3
+from dikbench.scenario.reference.waypoints import segment_at, segments_at
 
 SAME_PLACEMENT: Final = 1e-12
 """Placements whose entries differ by no more are one."""
@@ -70,6 +71,12 @@ def spline_through(times: Sequence[float], placements: Sequence[Any]) -> Referen
         s, r = u * (first[k] + u * (second[k] + u * third[k]))
         return pin.SE3(pin.exp3(r) @ R[k], p[k] + s)
 
+    def many(at: Array) -> Placed:
+        k, u = segments_at(times, at)
+        u = u[:, None, None]
+        parts = u * (first[k] + u * (second[k] + u * third[k]))
+        return exp3(parts[:, 1]) @ R[k], p[k] + parts[:, 0]
+
     def velocity(tau: float) -> Array:
         k, u = segment_at(times, tau)
         _, r = u * (first[k] + u * (second[k] + u * third[k]))
@@ -78,7 +85,7 @@ def spline_through(times: Sequence[float], placements: Sequence[Any]) -> Referen
         twist: Array = np.concatenate([to_body @ ds, to_body @ pin.Jexp3(-r) @ dr])
         return twist
 
-    return Reference(float(times[-1]), placement, velocity)
+    return Reference(float(times[-1]), Placement(placement, many), velocity)
 
 
 def _rests(spans: Array, ways: Array, turns: Array) -> Mask:

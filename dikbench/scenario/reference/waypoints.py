@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from dikbench.arrays import Array
+from dikbench.arrays import Array, Indices
 from dikbench.scenario.reference.embedded_path import SAME_INSTANT_S
-from dikbench.scenario.reference.reference import Reference
+from dikbench.scenario.reference.reference import Placed, Placement, Reference
+from dikbench.scenario.reference.screws import composed, exp6
 
 
 def through(times: Sequence[float], placements: Sequence[Any], *, smooth: bool) -> Reference:
@@ -36,13 +37,21 @@ def through(times: Sequence[float], placements: Sequence[Any], *, smooth: bool) 
         s = u**3 * (10 - 15 * u + 6 * u**2) if smooth else u
         return placements[k] * pin.exp6(pin.Motion(s * twists[k]))
 
+    whole = np.array(twists)
+    R, p = np.array([X.rotation for X in placements]), np.array([X.translation for X in placements])
+
+    def many(at: Array) -> Placed:
+        k, u = segments_at(times, at, rounding)
+        s = u**3 * (10 - 15 * u + 6 * u**2) if smooth else u
+        return composed(R[k], p[k], exp6(s[:, None] * whole[k]))
+
     def velocity(tau: float) -> Array:
         k, u = segment_at(times, tau, rounding)
         rate = 30 * u**2 * (1 - u) ** 2 if smooth else 1.0
         twist: Array = rate / spans[k] * twists[k]
         return twist
 
-    return Reference(float(times[-1]), placement, velocity)
+    return Reference(float(times[-1]), Placement(placement, many), velocity)
 
 
 def held(times: Sequence[float], placements: Sequence[Any]) -> Reference:
@@ -73,3 +82,12 @@ def segment_at(
     """
     k = min(max(bisect_right(times, tau + rounding) - 1, 0), len(times) - 2)
     return k, min(max((tau - times[k]) / (times[k + 1] - times[k]), 0.0), 1.0)
+
+
+def segments_at(
+    times: Sequence[float], at: Array, rounding: float = SAME_INSTANT_S
+) -> tuple[Indices, Array]:
+    """Find the segments and the shares (n,) of several times (n,) [s] (see `segment_at`)."""
+    ends = np.asarray(times)
+    k = np.clip(np.searchsorted(ends, at + rounding, side="right") - 1, 0, len(ends) - 2)
+    return k, np.clip((at - ends[k]) / (ends[k + 1] - ends[k]), 0.0, 1.0)

@@ -1,0 +1,140 @@
+"""The work of a worker process on a block of trials: those of one kind run in lockstep."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+from dikbench.errors import DikbenchError
+from dikbench.plugins.building_together import make_scenarios
+from dikbench.problem.problem import is_batched, program_of
+from dikbench.run.trial_row import (
+    CannotStore,
+    Prepared,
+    TracePolicy,
+    TrialRow,
+    attempted,
+    described,
+    prepare,
+    row_without_run,
+    rows_of,
+    run_prepared,
+)
+from dikbench.run.worker_process import restore_process
+from dikbench.scenario.oracle import ORACLES
+from dikbench.scenario.scenario import Scenario
+from dikbench.selector import parse_selector
+from dikbench.simulation.lockstep import kind_of, simulate_together
+from dikbench.simulation.status import Status
+from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER
+from dikbench.study.trial import Trial
+
+MOST_ROWS: Final = 256
+"""So many trials are in lockstep at most: more are hardly faster, and need their memory."""
+
+
+def work_together(
+    trials: Sequence[Trial],
+    traces: Sequence[Path],
+    policy: TracePolicy,
+    commit: str | None,
+    command: str,
+) -> tuple[list[TrialRow], TrialRow]:
+    """Run a block of trials in a worker process (see `dikbench.run.trial_row.work`).
+
+    Their scenarios are built together. Trials of one kind, formulation, solver, plant and clock run
+    in lockstep, where the formulation answers many at once; the others run alone.
+
+    Returns:
+        Their rows in their order, and the description of this process.
+
+    Raises:
+        CannotStore: if a trace cannot be written.
+    """
+    restore_process()
+    cells = list(dict.fromkeys((trial.scenario, trial.seed) for trial in trials))
+    built = dict(zip(cells, make_scenarios(cells), strict=True))
+    rows: dict[int, TrialRow] = {}
+    alone: list[tuple[int, Prepared]] = []
+    groups: dict[object, list[tuple[int, Prepared]]] = {}
+    for number, trial in enumerate(trials):
+        found = _prepared(trial, built[trial.scenario, trial.seed])
+        if not isinstance(found, Prepared):
+            rows[number] = found
+            continue
+        kind = _kind(found)
+        if kind is None:
+            alone.append((number, found))
+        else:
+            groups.setdefault(kind, []).append((number, found))
+    for group in groups.values():
+        for start in range(0, len(group), MOST_ROWS):
+            part = group[start : start + MOST_ROWS]
+            try:
+                made = _in_lockstep(part, traces, policy)
+            except CannotStore:
+                raise
+            except Exception:  # each trial then says what is wrong of it
+                alone += part
+                continue
+            rows.update(zip((number for number, _ in part), made, strict=True))
+    for number, ready in alone:
+        run = partial(run_prepared, ready, traces[number], policy)
+        rows[number] = attempted(ready.trial, run)
+    return [rows[number] for number in range(len(trials))], described(commit, command)
+
+
+def _prepared(trial: Trial, scenario: Scenario | BaseException) -> Prepared | TrialRow:
+    """Make what a trial consists of, or its row where it cannot run."""
+    try:
+        if isinstance(scenario, BaseException):
+            raise scenario
+        return prepare(trial, scenario)
+    except DikbenchError as error:
+        return row_without_run(trial, Status.SKIPPED, str(error))
+    except BaseException as error:
+        return attempted(trial, partial(_raise, error))
+
+
+def _raise(error: BaseException) -> TrialRow:
+    raise error
+
+
+def _kind(ready: Prepared) -> object | None:
+    """Return what trials must share to run in lockstep; None where one runs alone."""
+    trial = ready.trial
+    if trial.formulation.name in ORACLES or not is_batched(ready.formulation):
+        return None
+    kind = kind_of(ready.scenario)
+    if kind is None:
+        return None
+    return kind, trial.formulation, trial.solver, trial.plant, trial.reference
+
+
+def _in_lockstep(
+    group: Sequence[tuple[int, Prepared]], traces: Sequence[Path], policy: TracePolicy
+) -> list[TrialRow]:
+    """Run trials of one kind, and make their rows."""
+    ready = [each for _, each in group]
+    first = ready[0]
+    program = program_of(first.formulation)
+    # Where solvers are compared, each is asked for every row.
+    default = program is not None and first.trial.solver == parse_selector(DEFAULT_SOLVER[program])
+    restore_process()
+    found = simulate_together(
+        [each.scenario for each in ready],
+        first.formulation,
+        [each.solve() for each in ready],
+        first.plant,
+        first.mode,
+        [each.trial.seed for each in ready],
+        guesses=default,
+    )
+    paths = [traces[number] for number, _ in group]
+    rows = rows_of(ready, [each.run for each in found], paths, policy)
+    for row, each in zip(rows, found, strict=True):
+        row["asked_alone_steps"] = each.asked_alone
+    restore_process()
+    return rows
