@@ -11,7 +11,6 @@ from dikbench.errors import DikbenchError
 from dikbench.metrics.motion import Motion
 from dikbench.problem.tasks.rows import orientation_error
 from dikbench.robots.kinematics import Kinematics, placements
-from dikbench.scenario.reference.reference import Reference
 from dikbench.scenario.scenario import REST_ROUNDING_S, Scenario
 from dikbench.simulation.trace import Trace
 
@@ -179,13 +178,7 @@ def _targets(trace: Trace, scenario: Scenario) -> tuple[Array, Array]:
     if reference.moving:  # see `Scenario.target`
         over = reference.duration - tau < REST_ROUNDING_S
         tau = np.where(over, reference.duration, tau)
-    return _placements(reference, tau)
-
-
-def _placements(reference: Reference, times: Array) -> tuple[Array, Array]:
-    """Return the rotations (k, 3, 3) and translations (k, 3) [m] of a reference at times [s]."""
-    placed = [reference.placement(tau) for tau in times.tolist()]
-    return np.array([X.rotation for X in placed]), np.array([X.translation for X in placed])
+    return reference.placements(tau)
 
 
 def rotation_angles(first: Array, second: Array) -> Array:
