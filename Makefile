@@ -44,7 +44,10 @@ mutation:        ## which changes to the laws and limits no test notices (hours;
 benchmark-laws:  ## what the laws without a solver cost, as ratios to dls
 	$(PYTHON) tests/benchmarks/laws.py
 
+benchmark-metrics:  ## what metrics and rechecks cost per step, alone and together
+	$(PYTHON) tests/benchmarks/measuring.py
+
 constraints:     ## the installed versions become the tested ones
 	.venv/bin/pip freeze --exclude-editable --exclude pip --exclude setuptools > constraints.txt
 
-.PHONY: help setup test test-long test-random lint format contract quick benchmark benchmark-scenarios benchmark-solvers benchmark-laws mutation constraints
+.PHONY: help setup test test-long test-random lint format contract quick benchmark benchmark-scenarios benchmark-solvers benchmark-laws benchmark-metrics mutation constraints

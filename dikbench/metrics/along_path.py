@@ -76,7 +76,7 @@ class AlongPath:
         """How the path is covered in its order, for every tolerance."""
         at_target = np.searchsorted(self.trace.tau, self.path.times - SAME_INSTANT_S)
         at_target = np.minimum(at_target, self.trace.steps)
-        return Coverage(self.path.points, self.points, self.target_samples, at_target, self.apart)
+        return Coverage(self.path, self.points, self.target_samples, at_target, self.apart)
 
     @cached_property
     def covered_at(self) -> Indices:

@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 
 from dikbench.arrays import Array, Indices
+from dikbench.scenario.reference.embedded_path import EmbeddedPath
 
 LARGEST_TOLERANCE_M: Final = 0.25
 """No larger tolerance is searched for: a motion that needs one has not done the path."""
@@ -41,7 +42,7 @@ class Coverage:
     """The ordered coverage of a path by a motion, for every tolerance.
 
     Args:
-        samples: S_j, (f, d) [m] (see `Embedding`).
+        path: whose samples are S_j, (f, d) [m] (see `Embedding`).
         points: of the motion, at the start and after each step, (n + 1, d) [m].
         targets: number of the sample that the target has come to at each instant, not decreasing,
             (n + 1,): no later one is covered yet.
@@ -52,17 +53,22 @@ class Coverage:
     """
 
     def __init__(
-        self, samples: Array, points: Array, targets: Indices, at_target: Indices, apart: Array
+        self,
+        path: EmbeddedPath,
+        points: Array,
+        targets: Indices,
+        at_target: Indices,
+        apart: Array,
     ) -> None:
         count, ones = int(targets[-1]) + 1, np.ones(len(points))
-        S, x = samples[:count] - samples[0], points - samples[0]
+        x = points - path.points[0]
         starts = np.concatenate([x[:1], x[:-1]])
         ways = x - starts
         self._lengths = np.sqrt(np.einsum("ij,ij->i", ways, ways))
         ways /= np.where(self._lengths > 0, self._lengths, 1.0)[:, None]
         along, squares = (np.einsum("ij,ij->i", starts, each) for each in (ways, starts))
         # |S - a|^2 and (S - a) . d are products of [S, 1, |S|^2] with these.
-        self._samples = np.column_stack([S, ones[:1].repeat(count), np.einsum("ij,ij->i", S, S)])
+        self._samples = path.lifted[:count]
         self._away = np.column_stack([-2 * starts, squares, ones])
         self._along = np.column_stack([ways, -along, 0 * ones])
         self._apart_squares = apart**2 if apart.any() else None
@@ -167,12 +173,16 @@ class Coverage:
             g_j(k) = min over k' <= k of max(g_(j-1)(k'), square distance of S_j from segment k')
         """
         bounds, needed = dict.fromkeys(order, 0.0), np.zeros(len(self._lengths))
+        of_sample: dict[int, list[tuple[int, int, int]]] = {}
+        for each in order:
+            of_sample.setdefault(each[0], []).append(each)
         for sample in sorted(self._rows):
             possible = slice(self._earliest[sample], None)
             part = needed[possible]
             np.maximum(part, self._rows[sample][possible], out=part)
             np.minimum.accumulate(part, out=part)
-            bounds.update((each, float(needed[each[1]])) for each in order if each[0] == sample)
+            for each in of_sample.get(sample, ()):
+                bounds[each] = float(needed[each[1]])
         return list(bounds.values())
 
     def _cover(
@@ -222,7 +232,7 @@ class Coverage:
         S, lengths = self._samples[samples], self._lengths[segments]
         squares: Array
         squares, along = (
-            np.einsum("ij,ij->i", S, each[segments]) if pairs else S @ each[segments].T
+            np.einsum("ij,ij->i", S, each.take(segments, axis=0)) if pairs else S @ each[segments].T
             for each in (self._away, self._along)
         )
         share = np.minimum(np.maximum(along, 0.0), lengths)

@@ -77,6 +77,15 @@ class EmbeddedPath:
         """Largest distance of a sample from the first one [m]."""
         return float(np.linalg.norm(self.points - self.points[0], axis=1).max())
 
+    @cached_property
+    def lifted(self) -> Array:
+        """The samples from the first one on, [S, 1, |S|^2], (f, d + 2) [m].
+
+        Products with these are square distances (see `Coverage`).
+        """
+        S = self.points - self.points[0]
+        return np.column_stack([S, np.ones(len(S)), np.einsum("ij,ij->i", S, S)])
+
     def last_until(self, times: Any) -> Any:
         """Find the last sample whose nominal time is not after these [s]: its number."""
         return np.searchsorted(self.times, np.asarray(times) + SAME_INSTANT_S, side="right") - 1
@@ -186,7 +195,7 @@ class EmbeddedPath:
         """
         directions = self._directions
         other = np.clip(pieces + np.where(shares < 0.5, -1, 1), 0, len(directions) - 1)
-        own, next_ = directions[pieces], directions[other]
+        own, next_ = directions.take(pieces, axis=0), directions.take(other, axis=0)
         part = np.abs(shares - 0.5)[:, None]
         # Towards a piece that rests, or that turns back, there is nothing to interpolate.
         bends = np.einsum("ij,ij->i", own, next_)[:, None] > 0

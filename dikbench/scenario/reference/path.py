@@ -24,8 +24,8 @@ MAX_SAMPLES_PER_PERIOD: Final = 16
 NEGLIGIBLE_LENGTH_M: Final = 1e-9
 """A shorter path, or step along it, counts as a point."""
 
-FIRST_NEIGHBOUR_COUNT: Final = 3
-"""Number of nearest vertices that are searched first."""
+FIRST_NEIGHBOUR_COUNT: Final = 4
+"""Number of nearest vertices that are searched first: two ways that meet have two each."""
 
 POINTS_TOGETHER: Final = 128
 """Feet of so many points are computed at once: the arrays of more do not stay in the cache."""

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from dikbench.arrays import Array, Indices
 from dikbench.metrics.coverage import LARGEST_TOLERANCE_M, Coverage
+from dikbench.scenario.reference.embedded_path import EmbeddedPath
 
 ROUNDING = 1e-8
 
@@ -36,7 +37,9 @@ def made(case: tuple[Array, Array, Indices, Array], delay: int = 0) -> Coverage:
     """The coverage of a case; targets are there so many instants after they may be covered."""
     samples, points, targets, apart = case
     there = np.searchsorted(targets, np.arange(len(samples))) + delay
-    return Coverage(samples, points, targets, np.minimum(there, len(points) - 1), apart)
+    instants = np.arange(float(len(samples)))
+    path = EmbeddedPath(instants, samples, instants, len(samples) - 1)
+    return Coverage(path, points, targets, np.minimum(there, len(points) - 1), apart)
 
 
 def distance(sample: Array, start: Array, end: Array) -> float:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pinocchio as pin
@@ -14,12 +16,13 @@ from hypothesis import strategies as st
 
 from dikbench.arrays import Array
 from dikbench.metrics import METRICS, Motion, evaluate, motion_of
-from dikbench.metrics.chatter import largest_acceleration
+from dikbench.metrics.chatter import _reversals, _shaking, largest_acceleration
 from dikbench.plugins.building import make_plant, make_scenario
 from dikbench.problem import DikProblem, Solve
 from dikbench.problem.problem import Formulation
 from dikbench.scenario import Scenario
 from dikbench.scenario.reference.embedded_path import EmbeddedPath
+from dikbench.scenario.reference.path import ReferencePath
 from dikbench.simulation.closed_loop import simulate
 from dikbench.simulation.oracle_formulation import OracleFormulation
 from dikbench.solvers.checked_solve import make_solve
@@ -106,6 +109,24 @@ def test_the_nearest_point_of_a_path_is_the_least_over_its_pieces(seed: int) -> 
     np.testing.assert_allclose(np.linalg.norm(asked - feet, axis=1), distances, atol=1e-12)
 
 
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_the_distance_from_a_path_is_the_least_over_its_pieces(seed: int) -> None:
+    """Of pieces of any length, with ways back, for points near and far, more than a block."""
+    random = np.random.default_rng(seed)
+    count = int(random.integers(2, 150))
+    steps = random.choice([1e-4, 1e-2, 0.1], (count, 1)) * random.normal(size=(count, 3))
+    path = ReferencePath(np.cumsum(steps, axis=0), int(random.integers(1, count)))
+    asked = path.vertices[random.integers(0, path.once, 150)]
+    asked = asked + random.choice([0, 1e-3, 0.1], (150, 1)) * random.normal(size=(150, 3))
+    away, lengths = asked[:, None] - path.vertices[:-1], np.sqrt(path.squares)
+    directions = path.pieces / lengths[:, None]
+    along = np.minimum(np.maximum(np.einsum("ijk,jk->ij", away, directions), 0.0), lengths)
+    distances = np.linalg.norm(away - along[..., None] * directions, axis=2)
+    expected = distances[:, : path.once].min(axis=1)
+    np.testing.assert_allclose(path.distances(asked), expected, atol=1e-12)
+
+
 def test_of_a_path_that_runs_over_itself_the_first_pieces_count() -> None:
     """There and back on the same samples: whichever copy a search comes upon, it is the first."""
     there = np.column_stack([np.linspace(0, 1, 60) ** 3, np.zeros(60)])
@@ -148,6 +169,38 @@ def test_chatter_is_back_and_forth_beyond_the_acceleration_limit(
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("dikbench.metrics.chatter.SHAKING_AMPLITUDE", 1.0)
         assert _chattering_steps(v, dt) == expected * (n - 1)
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_all_who_shake_are_found(seed: int) -> None:
+    """Against every reversal of every joint: of noise, waves and rests of any size and pace."""
+    random = np.random.default_rng(seed)
+    scenario = scenario_of("speed-sweep[laps=1]")
+    assert scenario.robot.limits.velocity is not None
+    most, n = scenario.robot.limits.velocity.upper, int(random.integers(1, 120))
+    waves = np.sin(np.arange(n)[:, None] * random.uniform(0, 2, 7) + random.uniform(0, 6, 7))
+    v = most * random.choice([0, 1e-3, 0.006, 0.02, 0.2], (n, 7)) * waves
+    v[random.random((n, 7)) < random.choice([0, 0.3])] = 0.0
+    v = np.cumsum(v, axis=0) if random.random() < 0.5 else v
+    velocities = np.vstack([np.zeros(7), v])
+    longest = 2 / (10.0 * scenario.dt) * (1 + 1e-9)
+    expected = np.zeros(n, dtype=bool)
+    for joint in range(7):
+        turned = _reversals(velocities[:, joint], 0.01 * most[joint])
+        for start, end in zip(turned, turned[4:], strict=False):
+            if end - start <= longest:
+                expected[max(start - 1, 0) : end] = True
+    motion = cast(
+        Any,
+        SimpleNamespace(
+            velocities=velocities,
+            jumps=np.diff(velocities, axis=0),
+            scenario=scenario,
+            trace=SimpleNamespace(steps=n, dt=scenario.dt),
+        ),
+    )
+    np.testing.assert_array_equal(_shaking(motion), expected)
 
 
 def _chattering_steps(velocity: Array, dt: float) -> float:
