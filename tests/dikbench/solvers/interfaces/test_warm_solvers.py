@@ -173,7 +173,7 @@ def _in_turns(names: Iterable[str], structures: Iterable[str]) -> Iterator[Any]:
             yield pytest.param(name, structure, seed, marks=marks)
 
 
-@pytest.mark.parametrize(("name", "structure", "seed"), _in_turns(NAMES, STRUCTURES))
+@pytest.mark.parametrize(("name", "structure", "seed"), [*_in_turns(NAMES, STRUCTURES)])
 def test_a_drifting_quadratic_program_is_solved_at_every_step(
     name: str, structure: str, seed: int
 ) -> None:
@@ -184,7 +184,7 @@ def test_a_drifting_quadratic_program_is_solved_at_every_step(
         reference.compare(program, warm(program, 0))
 
 
-@pytest.mark.parametrize(("name", "structure", "seed"), _in_turns(LINEAR, IN_BOUNDS))
+@pytest.mark.parametrize(("name", "structure", "seed"), [*_in_turns(LINEAR, IN_BOUNDS)])
 def test_a_drifting_linear_program_is_solved_at_every_step(
     name: str, structure: str, seed: int
 ) -> None:
