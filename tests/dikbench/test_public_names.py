@@ -52,7 +52,7 @@ def test_a_study_runs_from_a_script_as_from_the_command_line(tmp_path: Path) -> 
         (tmp_path / name).mkdir()
         (tmp_path / name / "__init__.py").touch()
     (tmp_path / "untimed.toml").write_text(
-        'description = "a study without times"\nscenarios = ["reach"]\n'
+        'description = "untimed"\nscenarios = ["reach"]\nplants = ["ideal"]\n'
         '[[cells]]\nformulations = ["pinv"]\n'
     )
     script.write_text(

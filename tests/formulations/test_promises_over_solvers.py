@@ -32,7 +32,7 @@ pytestmark = [
 
 LAWS = [name for name in sorted(plugins("formulation")) if program_of(make_formulation(name))]
 SOLVERS = [f"{name}[interface={way}]" for name in BACK_ENDS for way in BACK_ENDS[name].interfaces]
-STRIDE = 11
+STRIDE = 7
 """One state in so many is asked in the normal run. No period of the states divides it: all speeds,
 limits, rows and motions before come up."""
 
