@@ -321,8 +321,8 @@ def test_a_plugin_of_another_project_is_listed_and_runs(tmp_path: Path) -> None:
         "[dikbench.formulations]\nmine = my_laws\n[dikbench.scenarios]\nmine = my_scenarios\n"
     )
     scenario = "my-family[distance=0.1,duration=0.2]"
-    run = ("run", "untimed.toml", "--formulation", "my-formulation[gain=2]")
-    run = (*run, "--scenario", scenario)
+    study = ("run", "untimed.toml", "--scenario", scenario)
+    run = (*study, "--formulation", "my-formulation[gain=2]")
     how = ("--plant", "ideal", "--reference", "time", "--jobs", "1", "--out", "out")
     listed, ran = run_all(tmp_path, [("list",), (*run, *how)], path=site)
     assert "my-formulation" in (listed / "stdout").read_text()

@@ -165,7 +165,11 @@ def test_seeds_differ_and_a_path_indexed_run_waits(results: Path) -> None:
 
 def test_a_run_is_the_same_with_one_worker_and_with_two(tmp_path: Path) -> None:
     """Every column but the times is bit-equal whatever the number of workers."""
-    selection = Selection(scenarios=("near-miss[miss=0.02,dt=0.05]",), plants=("ideal",))
+    selection = Selection(
+        formulations=("oracle", "dls", "qp", "lp-alpha-cvxpy"),
+        scenarios=("near-miss[miss=0.02,dt=0.05]",),
+        plants=("ideal",),
+    )
     planned = expand(select(load_study("smoke"), selection, named=True))
     tables = []
     folders = [ResultsFolder(tmp_path / str(jobs)) for jobs in (1, 2)]
@@ -266,7 +270,8 @@ def pairs(tmp_path_factory: pytest.TempPathFactory, hung: Path) -> Pairs:
         for how, (bad, good) in pairs_of(str(hung / "hostile.py:Hostile"), ENDLESS).items()
     }
     folder = made_once(tmp_path_factory, "hostile", _run_hostile)
-    return found | pickle.loads((folder / "pairs").read_bytes())
+    found |= pickle.loads((folder / "pairs").read_bytes())
+    return found
 
 
 def _run_hostile(folder: Path) -> None:
