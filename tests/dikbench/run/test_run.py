@@ -265,12 +265,14 @@ def pairs(tmp_path_factory: pytest.TempPathFactory, hung: Path) -> Pairs:
     """Those of two runs: one with a short limit of time, and one without."""
     rows = pd.read_csv(hung / "out" / "trials.csv")
     rows = rows[rows["reference"] == "time"].set_index("formulation", drop=False)
-    found = {
-        how: (rows.loc[bad].to_dict(), rows.loc[good].to_dict())
-        for how, (bad, good) in pairs_of(str(hung / "hostile.py:Hostile"), ENDLESS).items()
-    }
+
+    def row(formulation: str) -> dict[str, Any]:
+        return {str(name): value for name, value in rows.loc[formulation].items()}
+
     folder = made_once(tmp_path_factory, "hostile", _run_hostile)
-    found |= pickle.loads((folder / "pairs").read_bytes())
+    found: Pairs = pickle.loads((folder / "pairs").read_bytes())
+    for how, (bad, good) in pairs_of(str(hung / "hostile.py:Hostile"), ENDLESS).items():
+        found[how] = row(bad), row(good)
     return found
 
 
