@@ -83,7 +83,8 @@ def test_what_cannot_be_reached_costs_the_others_nothing(name: str) -> None:
     robot = load_robot(name)
     twists = [[0.02, 0.01, 0, 0, 0, 0.1], [50.0, 0, 0, 0, 0, 0], [0, 0.02, 0, 0, 0, -0.1]]
     alone, together = ([to(robot, twist) for twist in twists] for _ in range(2))
-    alone[1].targets[1] = together[1].targets[1] = "nowhere"  # type: ignore[index]
+    for each in (alone[1], together[1]):
+        each.targets = [*list(each.targets)[:1], "nowhere"]
     for each in alone:
         pursue([each])
     pursue(together)
@@ -106,7 +107,7 @@ def test_a_matrix_that_cannot_be_inverted_costs_its_own_motion_only(
     solve, bad = np.linalg.solve, pursuits[2]
 
     def refuses(M: np.ndarray, e: np.ndarray) -> np.ndarray:
-        first = bad.targets[0]
+        first = next(iter(bad.targets))
         kinematics = Kinematics(robot)
         kinematics.update(robot.q0)
         error = pin.log6(kinematics.placement(robot.frame_id).actInv(first)).np

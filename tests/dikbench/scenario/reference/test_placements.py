@@ -91,7 +91,7 @@ def test_no_times_are_no_placements(name: str) -> None:
     reference = MADE[name](np.random.default_rng(0))
     rotations, translations = reference.placements(np.empty(0))
     assert (rotations.shape, translations.shape) == ((0, 3, 3), (0, 3))
-    assert reference.targets(np.empty(0)) == []
+    assert list(reference.targets(np.empty(0))) == []
 
 
 def test_a_function_of_one_time_is_asked_for_each() -> None:
