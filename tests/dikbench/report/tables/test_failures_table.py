@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from makers.rows import make_rows
+from makers.rows import Values, make_rows
 
 from dikbench.metrics import Judgement, Outcome
 from dikbench.report.tables.failures import (
@@ -114,9 +114,9 @@ def test_the_trial_that_is_shown_is_the_one_of_the_row() -> None:
 def test_no_formulation_is_crowded_out_by_those_that_fail_worse(laws: int) -> None:
     """Each with its worst case at least; formulations take turns, and solvers are one of it."""
     scenarios = [f"reach[distance=0.{number + 1}]" for number in range(6)]
-    reckless = {(f"reckless{k}", "none"): SPEED for k in range(laws)}
-    solvers = {("qp", f"solver{k}"): SPEED for k in range(30)}
-    rows = make_rows({**reckless, **solvers, "careful": LEFT}, scenarios)
+    law: dict[str | tuple[str, str], Values] = {f"reckless{k}": SPEED for k in range(laws)}
+    law |= {("qp", f"solver{k}"): SPEED for k in range(30)}
+    rows = make_rows({**law, "careful": LEFT}, scenarios)
     shown = [str(case["formulation"]).split(",")[0] for case in told(rows)]
     assert shown.count("careful") == (3 if laws == 3 else 1)
     assert shown[-1] == "careful"
