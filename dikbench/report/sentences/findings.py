@@ -83,8 +83,8 @@ def leaders(
         setting: of the rows.
         candidates: who may be first (see `dependable`).
         names: how formulations are called.
-        barred: who is no candidate but is named where it does as well, and the share of all trials
-            in which each is stopped (see `held_back`).
+        barred: who is no candidate but is named where somebody stands out and it does as well, and
+            the share of all trials in which each is stopped (see `held_back`).
     """
     may_be = told_of(part, candidates)
     found = rates(part, succeeded(part), may_be)
@@ -118,7 +118,8 @@ def leaders(
             by_rate = sorted(slower, key=lambda k: -found.rate[k])
             said += f"; slower: {_with_shares([(every[k], found.rate[k]) for k in by_rate], names)}"
         said += _next(found, rivals & (found.upper < 0), every, names)
-    said += _as_good(part, found, barred or {}, float(found.rate[first].max()), names)
+    if question != "Nobody stands out":
+        said += _as_good(part, found, barred or {}, float(found.rate[first].max()), names)
     text = f"success of {cases_in_words(part)}: {said}{_pace(part, setting, may_lead, found)}."
     contenders = tuple(every[k] for k in order)
     return Leaders(contenders, alone, found, Finding(f"{question} where {IN_WORDS[setting]}", text))

@@ -136,6 +136,10 @@ def test_who_does_as_well_and_is_stopped_elsewhere_is_named_as_such() -> None:
         " points less; as successful, but no candidate (stopped in 12.5 % of all trials): `c`."
     )
     assert found.contenders == (("a", "none"),)
+    rows = _rows({"a": {}, "b": {}, "c": {}})
+    found = leaders(rows, "time", [("a", "none"), ("b", "none")], Names(rows), barred)
+    assert found is not None
+    assert found.finding.text.endswith("all 2 candidates have 100 %.")
 
 
 def test_after_a_few_rates_the_others_are_counted() -> None:
