@@ -199,8 +199,10 @@ def _cell(column: Column, cell: TableCell) -> str:
 
 
 def _number(value: float, most: float) -> str:
-    r"""A number in text, a power of ten as \times 10^k."""
-    text = shown(value, most)
+    r"""A number in text, a power of ten as \times 10^k; what is just beyond a limit as >."""
+    text = shown(value)
+    if shown(value, most) != text:  # there is no room for more digits
+        return f"$>${text}"
     if "inf" in text:
         return text.replace("inf", r"$\infty$").replace("-", "$-$")
     mantissa, _, exponent = text.partition("e")
