@@ -85,34 +85,26 @@ def success_table(trials: pd.DataFrame) -> Table:
     )
     plant, every = judged_plant(trials), rows_of_all(of_setting)
     blocks = [
-        Block(ALL, plant, setting, _rows(rows, candidates, situations), _too_few(rows, situations))
+        Block(ALL, plant, setting, _rows(rows, candidates, situations), _sizes(rows, situations))
         for setting, rows, candidates in (
             (setting, rows, dependable(rows, every)) for setting, rows in found.items()
         )
     ]
-    notes = (*_notes(trials), *_samples(found, situations))
-    return Table("success", TITLE, columns, tuple(blocks), notes, NO_OUTCOMES)
+    return Table("success", TITLE, columns, tuple(blocks), tuple(_notes(trials)), NO_OUTCOMES)
 
 
-def _samples(found: Mapping[Setting, pd.DataFrame], situations: Sequence[Situation]) -> list[str]:
-    """Say for each setting of how many scenarios of which robots each column is."""
-    told = []
-    for setting, rows in found.items():
-        parts = [(name, rows[rows["situation"].eq(name)]) for name in situations]
-        said = [f"{name}: {scenarios_in_words(part)}" for name, part in parts if len(part)]
-        told.append(f"Sample where {IN_WORDS[setting]}: {'. '.join(said)}.")
-    return told
-
-
-def _too_few(rows: pd.DataFrame, situations: Sequence[Situation]) -> str:
-    """Name the situations of a setting in which too few scenarios count for a star."""
+def _sizes(rows: pd.DataFrame, situations: Sequence[Situation]) -> str:
+    """Say of a setting which columns are of too few scenarios for a star, and of what each is."""
     parts = {situation: rows[rows["situation"].eq(situation)] for situation in situations}
     few = [
         f"{situation} ({several(part['scenario'].nunique(), 'scenario')})"
         for situation, part in parts.items()
         if len(part) and too_few(part)
     ]
-    return f"Too few cases for stars: {', '.join(few)}." if few else ""
+    said = [f"{name}: {scenarios_in_words(part)}" for name, part in parts.items() if len(part)]
+    return (f"Too few cases for stars: {', '.join(few)}. " if few else "") + (
+        f"Samples: {'. '.join(said)}."
+    )
 
 
 def _rows(
