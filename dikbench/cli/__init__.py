@@ -150,6 +150,14 @@ def _selected(study: str | None, axes: dict[str, Any], out: Path | None) -> tupl
     show_default=True,
     help="Which trials keep their control steps.",
 )
+@click.option(
+    "--engine",
+    type=click.Choice(["auto", "alone", "lockstep"]),
+    default="auto",
+    show_default=True,
+    help="Whether trials of one kind run in lockstep, many at a time, or each alone; auto: in "
+    "lockstep where there are many of a kind. The results are the same but for rounding.",
+)
 @one_line_errors
 def run(
     study: str | None,
@@ -159,6 +167,7 @@ def run(
     trial_timeout: float,
     trial_memory: int,
     traces: Any,
+    engine: Any,
     **axes: Any,
 ) -> None:
     """Run what is missing of a study: the matrix of formulations x scenarios x solvers.
@@ -176,7 +185,9 @@ def run(
     selected, folder = _selected(study, axes, out)
     command = shlex.join(["dikbench", *sys.argv[1:]])
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a stop like Ctrl-C
-    settings = RunSettings(jobs or available_cores(), trial_timeout, trial_memory, traces, rerun)
+    settings = RunSettings(
+        jobs or available_cores(), trial_timeout, trial_memory, traces, rerun, engine
+    )
     try:
         run_study(selected, folder, settings, command)
     except Interrupted as stopped:

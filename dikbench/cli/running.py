@@ -14,6 +14,7 @@ from dikbench.parameters import Range
 from dikbench.report.write import write_report
 from dikbench.results.reading import Results, load_results
 from dikbench.run import runner
+from dikbench.run.blocks import EngineChoice
 from dikbench.run.pool import available_cores
 from dikbench.run.runner import RunSettings
 from dikbench.run.trial_row import TracePolicy
@@ -47,6 +48,7 @@ def run_study(
     trial_memory: int = 4096,
     traces: TracePolicy = "all",
     rerun: str = "",
+    engine: EngineChoice = "auto",
     report: bool = True,
 ) -> Results:
     """Run what is missing of a study, write its report and load its results.
@@ -78,6 +80,8 @@ def run_study(
         traces: which trials keep their control steps: all, failures or none.
         rerun: finished trials that are run again: failed, outdated (made by other sources or
             versions), all, or the name or selector of a formulation, scenario or solver.
+        engine: `lockstep`: trials of one kind run many at a time; `alone`: each by itself; `auto`:
+            in lockstep where there are many of a kind. The results are the same but for rounding.
         report: whether tables, figures and the report are written.
 
     Raises:
@@ -89,6 +93,7 @@ def run_study(
     _LEAST_ONE.check("trial_memory", trial_memory)
     Range(above=0.0, unit="s").check("trial_timeout", trial_timeout)
     _check_choice("traces", traces, get_args(TracePolicy))
+    _check_choice("engine", engine, get_args(EngineChoice))
     selection = Selection(
         formulations=_texts("formulations", formulations),
         scenarios=_texts("scenarios", scenarios),
@@ -100,7 +105,9 @@ def run_study(
     for reference in selection.references:
         _check_choice("references", reference, REFERENCE_MODES)
     chosen = selected(None if study is None else str(study), selection)
-    settings = RunSettings(jobs or available_cores(), trial_timeout, trial_memory, traces, rerun)
+    settings = RunSettings(
+        jobs or available_cores(), trial_timeout, trial_memory, traces, rerun, engine
+    )
     folder = results_folder(chosen, out)
     given = {axis: found for axis, found in asdict(selection).items() if found}
     runner.run_study(chosen, folder, settings, f"dikbench.run_study({study!r}, **{given})")

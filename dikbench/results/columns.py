@@ -24,6 +24,14 @@ SEES: Final[Mapping[str, str]] = MappingProxyType(
 )
 """Columns of what a formulation sees of a scenario's problems, and what they say."""
 
+ASKED: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "asked_alone_steps": "control steps at which the formulation was asked for this trial "
+        "alone; empty where the trial did not run in lockstep"
+    }
+)
+"""Columns of how a trial was run, and what they say."""
+
 TIMED: Final = ["formulation", "solver", "scenario"]
 """Columns that identify the cell of a row of times."""
 
@@ -96,6 +104,7 @@ DESCRIBED: Final = MappingProxyType(
         **{name: ("", text) for name, text in OUTCOME_TEXTS.items()},
         **OUTCOME_NUMBERS,
         **{name: ("", text) for name, text in SEES.items()},
+        **{name: ("", text) for name, text in ASKED.items()},
         "wall_time_s": ("s", "time of the trial in its worker"),
         "control_time_s": ("s", "of it in kinematics, formulation and solver"),
         "environment": ("", "name of the worker's environment in the store"),

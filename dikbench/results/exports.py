@@ -47,12 +47,15 @@ def read_trials(folder: Path, notes: list[str]) -> pd.DataFrame:
     if not (folder / TRIALS).is_file() and (folder / PARQUET).is_file():
         return _named_as_today(_parquet(folder / PARQUET))
     trials = _named_as_today(_rows(folder / TRIALS, notes))
-    for name in trials.columns:
+    columns = {}
+    for name, texts in trials.items():
         if name not in TEXT:
-            trials[name] = _numbers(trials[name])
+            columns[name] = _numbers(texts)
         elif name not in ("message", *OUTCOME_TEXTS):
-            trials[name] = trials[name].replace("", None)
-    return trials
+            columns[name] = texts.replace("", None)
+        else:
+            columns[name] = texts
+    return pd.DataFrame(columns)
 
 
 def _named_as_today(trials: pd.DataFrame) -> pd.DataFrame:
@@ -123,10 +126,11 @@ def _numbers(texts: pd.Series) -> pd.Series:
 
     Python converts them, since pandas is wrong in the last bit.
     """
+    values = [text or "nan" for text in texts.tolist()]
     kinds: tuple[type, ...] = (int, float)
     for kind in kinds:
         try:
-            return texts.replace("", float("nan")).astype(kind)
-        except (ValueError, TypeError):
+            return pd.Series([kind(value) for value in values], texts.index, kind)
+        except (ValueError, OverflowError):
             continue
     return texts

@@ -12,7 +12,7 @@ import pandas as pd
 
 from dikbench.errors import DikbenchError
 from dikbench.metrics import METRICS, OUTCOME_NUMBERS, OUTCOME_TEXTS
-from dikbench.results.columns import DESCRIBED, KEYS, SEES, SELECTORS, TIMES
+from dikbench.results.columns import ASKED, DESCRIBED, KEYS, SEES, SELECTORS, TIMES
 from dikbench.results.exports import MANIFEST, are_exported, read_manifest, read_trials
 from dikbench.results.folder import ResultsFolder
 from dikbench.results.selected import selected_columns, with_selected
@@ -27,6 +27,7 @@ NUMBERS: Final = (
     *METRICS,
     *OUTCOME_NUMBERS,
     *SEES,
+    *ASKED,
     "wall_time_s",
     "control_time_s",
     *(name for name, (kind, _) in TIMES.items() if kind != "TEXT"),

@@ -10,7 +10,15 @@ from typing import Final
 
 from dikbench.errors import DikbenchError
 from dikbench.metrics import METRICS, OUTCOME_NUMBERS, OUTCOME_TEXTS
-from dikbench.results.columns import KEYS, REDEFINED, RENAMED_METRICS, RENAMED_TIMES, SEES, TIMES
+from dikbench.results.columns import (
+    ASKED,
+    KEYS,
+    REDEFINED,
+    RENAMED_METRICS,
+    RENAMED_TIMES,
+    SEES,
+    TIMES,
+)
 
 SCHEMA_VERSION: Final = 4
 """Version of the tables below. Stores of versions 1 to 3 are brought to it when they are
@@ -19,7 +27,7 @@ opened; other versions are refused."""
 RENAMING_VERSIONS: Final = ("1", "2")
 """Versions in which some metrics had other definitions."""
 
-NUMBERS: Final = (*METRICS, *OUTCOME_NUMBERS, *SEES, "wall_time_s", "control_time_s")
+NUMBERS: Final = (*METRICS, *OUTCOME_NUMBERS, *SEES, *ASKED, "wall_time_s", "control_time_s")
 
 ROW: Final[Mapping[str, str | None]] = MappingProxyType(
     {

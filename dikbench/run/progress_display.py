@@ -30,11 +30,11 @@ class ProgressDisplay:
         """Return the display."""
         return self
 
-    def advance(self) -> None:
-        """Count one more finished piece of work."""
-        self._done += 1
+    def advance(self, pieces: int = 1) -> None:
+        """Count more finished pieces of work."""
+        self._done += pieces
         if self._bar is not None:
-            self._bar.update()
+            self._bar.update(pieces)
             return
         now = time.monotonic()
         if now - self._last >= SECONDS_BETWEEN_LINES or self._done == self._total:

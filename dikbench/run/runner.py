@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
-from itertools import islice
 from multiprocessing import active_children
 from pathlib import Path
 from typing import Any, Final
@@ -17,12 +17,21 @@ from pebble import ProcessExpired
 from dikbench.errors import DikbenchError, unknown
 from dikbench.results.folder import ResultsFolder
 from dikbench.results.store import Store
+from dikbench.run.blocks import (
+    Engine,
+    EngineChoice,
+    block_timeout,
+    blocks_of,
+    engine_of,
+    smaller,
+)
 from dikbench.run.folder_of_study import store_for
 from dikbench.run.pool import THREAD_VARIABLES, end_group, workers
 from dikbench.run.progress_display import ProgressDisplay
 from dikbench.run.provenance import environment, git_commit, manifest
 from dikbench.run.timing import Contender, time_scenario
 from dikbench.run.trial_row import CannotStore, TracePolicy, TrialRow, row_without_run, work
+from dikbench.run.trials_together import work_together
 from dikbench.scenario.oracle import ORACLES
 from dikbench.selector import Selector, parse_selector
 from dikbench.simulation.status import Status
@@ -47,6 +56,10 @@ TRIALS_HANDED_AHEAD_PER_WORKER: Final = 8
 """So many that no worker waits, and few enough that memory does not grow."""
 
 
+WORK: Final = (work.__module__, work_together.__module__)
+"""Modules that each worker imports at its start."""
+
+
 class Interrupted(Exception):
     """The user stopped the run; the message tells what is kept."""
 
@@ -60,6 +73,7 @@ class RunSettings:
         trial_timeout: wall-clock limit of a trial [s], enforced from outside its process.
         trial_memory: memory of a trial beyond that of its process at the start [MB].
         traces: which traces are kept.
+        engine: whether trials of one kind run in lockstep or each alone (see `engine_of`).
         rerun: which finished trials are run again: "", "failed", "outdated" (made by other sources
             or versions), "all", or the selector (or the name) of a formulation, scenario or solver.
     """
@@ -69,6 +83,7 @@ class RunSettings:
     trial_memory: int = 4096
     traces: TracePolicy = "all"
     rerun: str = ""
+    engine: EngineChoice = "auto"
 
 
 def run_study(study: Study, out: Path, settings: RunSettings, command: str) -> ResultsFolder:
@@ -94,7 +109,9 @@ def run_study(study: Study, out: Path, settings: RunSettings, command: str) -> R
         # What a worker of this run would say of itself, for rows of workers that died.
         worker = own | {"threads": dict.fromkeys(THREAD_VARIABLES, "1")}
         hidden = store.hidden()
-        run = store.begin_run(manifest(study, len(planned), own), planned)
+        engine = engine_of(planned, settings.engine, store)
+        described = {**manifest(study, len(planned), own), "engine": engine}
+        run = store.begin_run(described, planned)
         if hides := store.hidden() - hidden:
             print(
                 f"kept and not shown, of other sources than today: {hides} of the rows",
@@ -111,10 +128,13 @@ def run_study(study: Study, out: Path, settings: RunSettings, command: str) -> R
             print(f"{len(planned) - len(todo)} of {len(planned)} trials are done", file=sys.stderr)
         try:
             with ProgressDisplay(len(todo), "trials") as display:
-                for trial, row in run_trials(todo, folder, settings, commit, command):
-                    row["environment"] = store.environment(row.pop("described", worker))
-                    store.record_trials([({"id": trial.id, **row}, positions[trial.id])], run)
-                    display.advance()
+                for rows in run_trials(todo, folder, settings, commit, command, engine):
+                    for _, row in rows:
+                        row["environment"] = store.environment(row.pop("described", worker))
+                    store.record_trials(
+                        [({"id": trial.id, **row}, positions[trial.id]) for trial, row in rows], run
+                    )
+                    display.advance(len(rows))
             if study.timing is not None:
                 known = set() if settings.rerun == "all" else store.timed() - outdated
                 _time(store, run, study, planned, known, worker)
@@ -181,41 +201,80 @@ def run_trials(
     settings: RunSettings,
     commit: str | None = None,
     command: str = "",
-) -> Iterator[tuple[PlannedTrial, TrialRow]]:
-    """Run trials in worker processes and yield each row when it is finished.
+    engine: Engine = "alone",
+) -> Iterator[list[tuple[PlannedTrial, TrialRow]]]:
+    """Run trials in worker processes and yield rows when they are finished, together or singly.
 
     Raises:
         DikbenchError: if a trace cannot be written.
     """
-    skipped = [p for p in todo if p.skip]
-    yield from ((p, row_without_run(p.trial, Status.SKIPPED, p.skip)) for p in skipped)
+    yield [(p, row_without_run(p.trial, Status.SKIPPED, p.skip)) for p in todo if p.skip]
     # In the order of scenarios, so that a worker builds each once.
     first: dict[tuple[Selector, int], int] = {}
     for p in todo:
         first.setdefault((p.trial.scenario, p.trial.seed), len(first))
-    waiting = iter(
-        sorted((p for p in todo if not p.skip), key=lambda p: first[p.trial.scenario, p.trial.seed])
+    ordered = sorted(
+        (p for p in todo if not p.skip), key=lambda p: first[p.trial.scenario, p.trial.seed]
     )
+    blocks = [[p] for p in ordered] if engine == "alone" else blocks_of(ordered, settings.jobs)
+    yield from _run_blocks(deque(blocks), folder, settings, commit, command)
+
+
+def _run_blocks(
+    waiting: deque[list[PlannedTrial]],
+    folder: ResultsFolder,
+    settings: RunSettings,
+    commit: str | None,
+    command: str,
+) -> Iterator[list[tuple[PlannedTrial, TrialRow]]]:
+    """Run blocks of trials in worker processes; what kills its worker is run in smaller ones."""
+    most = TRIALS_HANDED_AHEAD_PER_WORKER * settings.jobs
+    given = settings.traces, commit, command
     processes: set[int] = set()
     try:
-        with workers(settings.jobs, (work.__module__,), settings.trial_memory) as pool:
-            running: dict[Future[Any], PlannedTrial] = {}
+        with workers(settings.jobs, WORK, settings.trial_memory) as pool:
+            running: dict[Future[Any], list[PlannedTrial]] = {}
             while True:
-                for p in islice(
-                    waiting, TRIALS_HANDED_AHEAD_PER_WORKER * settings.jobs - len(running)
-                ):
-                    arguments = (p.trial, folder.trace(p.id), settings.traces, commit, command)
-                    future = pool.schedule(work, args=arguments, timeout=settings.trial_timeout)
-                    running[future] = p
+                while waiting and len(running) < most:
+                    block = waiting.popleft()
+                    if len(block) == 1:
+                        [p] = block
+                        arguments: tuple[Any, ...] = (p.trial, folder.trace(p.id), *given)
+                        function: Callable[..., Any] = work
+                        timeout = settings.trial_timeout
+                    else:
+                        traces = [folder.trace(p.id) for p in block]
+                        arguments = ([p.trial for p in block], traces, *given)
+                        function = work_together
+                        timeout = block_timeout(block, settings.trial_timeout)
+                    future = pool.schedule(function, args=arguments, timeout=timeout)
+                    running[future] = block
                 if not running:
                     return
                 processes.update(child.pid for child in active_children() if child.pid)
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
-                    p = running.pop(future)
-                    yield p, _row(future, p.trial, settings.trial_timeout)
+                    block = running.pop(future)
+                    if len(block) == 1:
+                        [p] = block
+                        yield [(p, _row(future, p.trial, settings.trial_timeout))]
+                    elif (rows := _rows(future)) is None:
+                        waiting.extendleft(smaller(block))
+                    else:
+                        yield [*zip(block, rows, strict=True)]
     finally:
         for process in processes:
             end_group(process)
+
+
+def _rows(future: Future[Any]) -> list[TrialRow] | None:
+    """Return the rows of a finished block; None where one of its trials ended its worker."""
+    try:
+        rows, described = future.result()
+    except CannotStore:
+        raise
+    except Exception:
+        return None
+    return [{**row, "described": described} for row in rows]
 
 
 def _row(future: Future[Any], trial: Trial, timeout: float) -> TrialRow:

@@ -67,7 +67,6 @@ from dikbench.scenario.oracle import (
 from dikbench.scenario.reference.curves import circle, lemniscate, plane_of
 from dikbench.scenario.reference.pose_file import PoseFile, read_poses
 from dikbench.scenario.reference.reference import (
-    Placement,
     Reference,
     along_screw,
     joint_path,
@@ -115,7 +114,6 @@ __all__ = [
     "OrientationTask",
     "Parameters",
     "Perturbation",
-    "Placement",
     "PoseFile",
     "PoseTask",
     "PositionTask",

@@ -48,7 +48,8 @@ def limits_in_force(robot: Robot, *, acceleration: bool) -> Robot:
         DikbenchError: if `acceleration` is set and none are known for this robot.
     """
     if not acceleration:
-        return robot.with_limits(acceleration=None)
+        in_force = robot.limits.acceleration is not None
+        return robot.with_limits(acceleration=None) if in_force else robot
     if robot.available_acceleration is None:
         raise DikbenchError(
             f"robot {robot.name}: no acceleration limits are known; valid: acceleration=false, or "

@@ -41,6 +41,9 @@ BRANCH_SAMPLES: Final = 25
 """Number of samples of the branch that are looked at for singularities."""
 
 
+ROUNDING_M: Final = 1e-9
+"""A distance that is smaller by this only is no smaller."""
+
 TINY: Final = 1e-12
 """Keeps a division from failing."""
 
@@ -112,7 +115,7 @@ def _rigid_clearance(scenario: Scenario, last: float) -> str:
         for tau, q in zip(motion.instants, motion.q, strict=True):
             kinematics.update(q)
             distance = float(pairs.distances(kinematics)[rigid].min())
-            if tau <= last and distance - constraint.margin < deepest[0] - deepest[1]:
+            if tau <= last and distance - constraint.margin < deepest[0] - deepest[1] - ROUNDING_M:
                 deepest = (distance, constraint.margin, float(tau))
     distance, margin, tau = deepest
     if distance >= margin - ALLOWED_INSIDE_M:

@@ -46,7 +46,7 @@ class Pursuit:
     Attributes:
         robot: the robot.
         tracking: the task.
-        targets: where the task frame is to be (`pinocchio.SE3`).
+        targets: where the task frame is to be (`pinocchio.SE3`), read once.
         q0: the configuration to start from, (nq,).
         iterations: largest number of looks at the error for a target.
         found: the configurations, (nq,) each.
@@ -55,7 +55,7 @@ class Pursuit:
 
     robot: Robot
     tracking: TrackingTask
-    targets: Sequence[Any]
+    targets: Iterable[Any]
     q0: Array
     iterations: int = 200
     found: list[Array] = field(default_factory=list)
@@ -211,7 +211,7 @@ PURSUED_BY: Final[ContextVar[Callable[[Pursuit], None]]] = ContextVar("pursued",
 
 def configurations(
     robot: Robot,
-    targets: Sequence[Any],
+    targets: Iterable[Any],
     q0: Array,
     tracking: TrackingTask,
     iterations: int = 200,

@@ -12,6 +12,9 @@ as large (see `rates`), and no other of them is faster beyond doubt, where the p
 is first in a situation of a few scenarios: an interval over so few is as wide as it is unreliable,
 and seeds of a scenario are too much alike to make up for it. Nothing else is compared, so that rows
 of formulations that may not be first change nothing.
+
+That one is first does not say that the others are worse: `places` tells in addition whom the rows
+do not exclude, however far its rate is behind.
 """
 
 from __future__ import annotations
@@ -37,6 +40,10 @@ MOST_BROKEN_SHARE: Final = 0.05
 FEWEST_SCENARIOS: Final = 5
 """In situations of fewer scenarios nobody is first."""
 
+MOST_HELD_BACK_SHARE: Final = 0.25
+"""Who is stopped more often than that, but in at most this share, is named where it does as well as
+who is first (see `held_back`)."""
+
 FASTER: Final = 1.05
 """A path is done faster where its duration is smaller by more than this ratio."""
 
@@ -58,13 +65,44 @@ def dependable(trials: pd.DataFrame, of_all_settings: pd.DataFrame) -> set[Conte
         trials: the rows that count in the setting, of all situations.
         of_all_settings: those that count in any setting, over which it is counted who is stopped.
     """
+    least, rate_of, stopped = _records(trials, of_all_settings)
+    return {
+        name
+        for name, rate in rate_of.items()
+        if rate > least and stopped[name] <= MOST_BROKEN_SHARE
+    }
+
+
+def held_back(trials: pd.DataFrame, of_all_settings: pd.DataFrame) -> dict[Contender, float]:
+    """Find who would be dependable but for being stopped somewhat too often.
+
+    Args:
+        trials: as of `dependable`.
+        of_all_settings: likewise.
+
+    Returns:
+        The share of its trials in which each is stopped, above `MOST_BROKEN_SHARE` and at most
+        `MOST_HELD_BACK_SHARE`.
+    """
+    least, rate_of, stopped = _records(trials, of_all_settings)
+    return {
+        name: stopped[name]
+        for name, rate in rate_of.items()
+        if rate > least and MOST_BROKEN_SHARE < stopped[name] <= MOST_HELD_BACK_SHARE
+    }
+
+
+def _records(
+    trials: pd.DataFrame, of_all_settings: pd.DataFrame
+) -> tuple[float, dict[Contender, float], dict[Contender, float]]:
+    """Compute the rate that is asked for, and of who ran all cases its rate and share stopped."""
     moving = trials[_asks_for_motion(trials)]
     if moving.empty:
-        return set()
+        return 0.0, {}, {}
     overall = rates(moving, succeeded(moving))
     told = ~of_all_settings["sees_constraints"].eq(0)
-    stopped = of_all_settings["outcome"].isin(BROKEN) & told
-    share = stopped.groupby([of_all_settings[name] for name in CONTENDER]).mean()
+    is_stopped = of_all_settings["outcome"].isin(BROKEN) & told
+    share = is_stopped.groupby([of_all_settings[name] for name in CONTENDER]).mean()
     rate_of = {
         contender: float(rate)
         for contender, rate, whole in zip(
@@ -73,10 +111,11 @@ def dependable(trials: pd.DataFrame, of_all_settings: pd.DataFrame) -> set[Conte
             overall.whole,
             strict=True,
         )
-        if whole and contender[0] not in ORACLES and share[contender] <= MOST_BROKEN_SHARE
+        if whole and contender[0] not in ORACLES
     }
-    most = max(rate_of.values(), default=0.0)
-    return {name for name, rate in rate_of.items() if rate > SMALLEST_SHARE_OF_BEST * most}
+    stopped = {name: float(share[name]) for name in rate_of}
+    best = max((r for n, r in rate_of.items() if stopped[n] <= MOST_BROKEN_SHARE), default=0.0)
+    return SMALLEST_SHARE_OF_BEST * best, rate_of, stopped
 
 
 def told_of(part: pd.DataFrame, candidates: Collection[Contender]) -> set[Contender]:
@@ -97,9 +136,28 @@ def first_places(part: pd.DataFrame, found: Rates) -> Mask:
         part: the rows of the situation that count.
         found: their rates of success, among those that may be first.
     """
+    return places(part, found, found.best)[0]
+
+
+def places(part: pd.DataFrame, found: Rates, rivals: Mask) -> tuple[Mask, Mask]:
+    """Say who is first in a situation, and who of the rivals may be for all that the rows say.
+
+    Args:
+        part: the rows of the situation that count.
+        found: their rates of success, among the rivals.
+        rivals: who may be first, (k,).
+
+    Returns:
+        Who is first (see `first_places`), and, these included, of whom nobody is beyond doubt more
+        successful (the interval of its difference to the best holds 0) or as good and faster; (k,)
+        each, nobody where there are too few scenarios.
+    """
     if too_few(part):
-        return np.zeros(len(found.best), dtype=bool)
-    return found.best & ~_slower(part, found, found.best)
+        nobody = np.zeros(len(found.best), dtype=bool)
+        return nobody, nobody
+    not_slower = ~_slower(part, found)
+    not_worse = rivals & (found.upper >= 0)
+    return found.best & not_slower, (found.best | not_worse) & not_slower
 
 
 def _asks_for_motion(trials: pd.DataFrame) -> pd.Series:
@@ -114,15 +172,15 @@ def _asks_for_motion(trials: pd.DataFrame) -> pd.Series:
     return found
 
 
-def _slower(part: pd.DataFrame, found: Rates, first: Mask) -> Mask:
-    """Say who is slower than another of the first, beyond doubt, where both succeed."""
-    slower = np.zeros(len(first), dtype=bool)
+def _slower(part: pd.DataFrame, found: Rates) -> Mask:
+    """Say who is slower than one of the best, beyond doubt, where both succeed, (k,)."""
+    slower = np.zeros(len(found.best), dtype=bool)
     duration = part["slow_down"].where(succeeded(part))
     values = np.log(duration.to_numpy(dtype=float))
     if np.isnan(values).all():
         return slower
     matrix: Array = found.layout.fill(values)
-    for other in np.flatnonzero(first):
+    for other in np.flatnonzero(found.best):
         means, lower, _ = paired_means(matrix - matrix[:, [other]], found)
         slower |= (lower > 0) & (means > np.log(FASTER))
-    return slower & first
+    return slower

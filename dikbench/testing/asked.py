@@ -12,7 +12,7 @@ from dikbench.problem.problem import DikProblem, Formulation, program_of
 from dikbench.simulation.control_step import TrialEnded, control_step
 from dikbench.simulation.status import Status
 from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, Solver, parse_solver, why_not
-from dikbench.solvers.checked_solve import make_solve
+from dikbench.solvers.checked_solve import CheckedSolve, make_solve
 from dikbench.testing.cannot_check import CannotCheck
 from dikbench.testing.states import State, states
 
@@ -52,18 +52,28 @@ class Asked:
                 raise DikbenchError(reason)
 
     def answer(self, problem: DikProblem) -> Answer:
-        """Ask the formulation, with a solver that remembers nothing."""
+        """Ask the formulation, with a solver that remembers nothing, and recheck the solver."""
+        given, solve = self._ask(problem)
+        if given.velocity is None:
+            return given
+        rechecked = solve.rechecked()
+        status = Status.NOT_VERIFIED if rechecked.lied[0] else given.status
+        residual = solve.calls * float(rechecked.primal[0])
+        return Answer(given.velocity, status, status.sentence, residual)
+
+    def velocity(self, problem: DikProblem) -> Array | None:
+        """Ask likewise for the velocity alone, whatever a recheck would say; None: no answer."""
+        return self._ask(problem)[0].velocity
+
+    def _ask(self, problem: DikProblem) -> tuple[Answer, CheckedSolve]:
         solve = make_solve(self.solver, self.program)
         try:
             answer = control_step(self.formulation, problem, solve)
         except TrialEnded as ended:
-            return Answer(None, ended.status, str(ended), 0.0)
-        if answer.status in {Status.INFEASIBLE, Status.SOLVER_FAILED}:
-            return Answer(None, answer.status, answer.status.sentence, 0.0)
-        rechecked = solve.rechecked()
-        status = Status.NOT_VERIFIED if rechecked.lied[0] else answer.status
-        residual = solve.calls * float(rechecked.primal[0])
-        return Answer(answer.velocity, status, status.sentence, residual)
+            return Answer(None, ended.status, str(ended), 0.0), solve
+        none = answer.status in {Status.INFEASIBLE, Status.SOLVER_FAILED}
+        velocity = None if none else answer.velocity
+        return Answer(velocity, answer.status, answer.status.sentence, 0.0), solve
 
     @cached_property
     def answers(self) -> list[tuple[State, Answer]]:

@@ -81,17 +81,17 @@ def check_sight(formulation: Formulation | Asked, solver: str | None = None) -> 
     asked = asked_of(formulation, solver)
     seen = sight_of(asked.formulation)
     said = frozenset(getattr(asked.formulation, "sees", ()))
+    bare = [(s.label, _changed(s.problem, s.problem.tasks[:1], None, None)) for s in states()]
+    alone = [asked.velocity(problem) for _, problem in bare]
     for what, (change, declared) in ADDED.items():
         random, differs = np.random.default_rng(0), False
-        for state in states():
-            bare = _changed(state.problem, state.problem.tasks[:1], None, None)
-            v = asked.answer(bare).velocity
-            w = asked.answer(change(bare, random)).velocity
+        for (label, problem), v in zip(bare, alone, strict=True):
+            w = asked.velocity(change(problem, random))
             same = v is w is None or (v is not None and w is not None and np.array_equal(v, w))
             differs |= not same
             if not same and not declared & seen:
                 raise AssertionError(
-                    f"{state.label}: {what} changed the answer, which `sees` does not declare"
+                    f"{label}: {what} changed the answer, which `sees` does not declare"
                 )
         if declared & said and not differs:
             raise AssertionError(f"`sees` declares {what}, which changed no answer")

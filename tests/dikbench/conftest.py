@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from makers.runs import briefly_timed
 from makers.shared import made_once
 
 from dikbench.report.write import write_report
@@ -20,11 +21,10 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def _run(out: Path) -> None:
     selection = Selection(
-        scenarios=("reach[dt=0.02]", "near-miss[miss=0.02,dt=0.02]"),
+        scenarios=("reach[dt=0.05]", "near-miss[miss=0.02,dt=0.02]"),
         references=("time", "path"),
         seeds=(0, 1),
     )
-    run_study(
-        select(load_study("smoke"), selection, named=True), out, RunSettings(jobs=2), "a test"
-    )
+    study = briefly_timed(select(load_study("smoke"), selection, named=True))
+    run_study(study, out, RunSettings(jobs=2), "a test")
     write_report(out)

@@ -51,11 +51,15 @@ def test_a_study_runs_from_a_script_as_from_the_command_line(tmp_path: Path) -> 
     for name in ("formulations", "scenarios"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "__init__.py").touch()
+    (tmp_path / "untimed.toml").write_text(
+        'description = "untimed"\nscenarios = ["reach"]\nplants = ["ideal"]\n'
+        '[[cells]]\nformulations = ["pinv"]\n'
+    )
     script.write_text(
         "import dikbench\n"
         "chosen = {'formulations': 'dls', 'scenarios': 'reach[duration=0.2]'}\n"
         "chosen['references'] = 'time'\n"
-        "results = dikbench.run_study(**chosen, out='out', jobs=1)\n"
+        "results = dikbench.run_study('untimed.toml', **chosen, out='out', jobs=1)\n"
         "print(list(results.trials['status']), len(results.steps()))\n"
     )
     done = subprocess.run(

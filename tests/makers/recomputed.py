@@ -105,6 +105,15 @@ def whole(rows: list[Row]) -> set[Contender]:
 
 def may_be_first(trials: list[Row], setting: str) -> set[Contender]:
     """Find who may be first in a setting; who is stopped is counted in both."""
+    return {name for name, share in successful(trials, setting).items() if share <= 0.05}
+
+
+def successful(trials: list[Row], setting: str) -> dict[Contender, float]:
+    """Find who does more than half of what the best of those that keep limits does.
+
+    Returns:
+        The share of the trials of both settings in which each is stopped by what it is told of.
+    """
     rows = that_count(trials, setting)
     everywhere = {(case(r), r["reference"], *contender(r)): r
                   for each in ("time", "path") for r in that_count(trials, each)
@@ -123,13 +132,15 @@ def may_be_first(trials: list[Row], setting: str) -> set[Contender]:
             number(row["judged_by_path"]) == 0 and reached[case(row)] <= number(row["tolerance_m"])
         )
     ]
-    rates = {}
+    rates, shares = {}, {}
     for name in whole(moving) if moving else ():
         own = by_contender(all_rows)[name]
         stopped = [row["outcome"] in BROKEN and number(row["sees_constraints"]) != 0 for row in own]
-        if "oracle" not in name[0] and sum(stopped) <= 0.05 * len(own):
+        if "oracle" not in name[0]:
             rates[name] = rate(by_contender(moving)[name])
-    return {name for name, value in rates.items() if value > 0.5 * max(rates.values())}
+            shares[name] = sum(stopped) / len(own)
+    best = max((value for name, value in rates.items() if shares[name] <= 0.05), default=0.0)
+    return {name: shares[name] for name, value in rates.items() if value > 0.5 * best}
 
 
 def weights_of(rows: list[Row]) -> dict[tuple[str, str], float]:

@@ -8,12 +8,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
 from dikbench.results.folder import ResultsFolder
 from dikbench.run import recompute, runner
 from dikbench.run.runner import RunSettings, run_study
-from dikbench.study.study import Study
+from dikbench.study.study import Study, TimingSettings
 
 
 class _NoPool:
@@ -49,3 +50,8 @@ def run_here(study: Study, out: Path, settings: RunSettings, command: str) -> Re
     """Run a study as `run_study` does, without workers."""
     with without_workers():
         return run_study(study, out, settings, command)
+
+
+def briefly_timed(study: Study) -> Study:
+    """Make the same study, whose timing pass takes a few times only."""
+    return msgspec.structs.replace(study, timing=TimingSettings("dls", problems=10, rounds=2))

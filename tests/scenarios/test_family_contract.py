@@ -19,7 +19,10 @@ from dikbench.scenario import Case, Claim, Family, Perturbation, Range, Robot, S
 from dikbench.testing import FAMILY_CHECKS, FamilyCheck, check_family
 from dikbench.testing.family import (
     check_family_certificate,
+    check_family_deterministic,
     check_family_parts,
+    check_family_picklable,
+    check_family_ranges,
     check_family_seeds,
 )
 from scenarios.reach import Reach
@@ -31,18 +34,38 @@ REQUIRED = {"csv": f"[file={TRIANGLE}]"}
 LOOK_ONLY = (check_family_certificate, check_family_parts, check_family_seeds)
 """Checks that make no scenario again, for which one of each seed is enough."""
 
+MAKE_AGAIN = (check_family_deterministic, check_family_picklable)
+"""Checks that compare two scenarios of one seed, the first of which may be known already."""
+
+FAMILIES = [*plugins("scenario")]
+
 
 @pytest.mark.parametrize("check", FAMILY_CHECKS, ids=lambda check: check.__name__)
-@pytest.mark.parametrize("name", plugins("scenario"))
+@pytest.mark.parametrize("name", FAMILIES)
 def test_registered_family_keeps_the_contract(
     monkeypatch: pytest.MonkeyPatch, name: str, check: FamilyCheck
 ) -> None:
-    """Every registered family keeps every clause of the contract."""
-    selector = name + REQUIRED.get(name, "")
-    if check in LOOK_ONLY:
-        module = sys.modules[check.__module__]
-        monkeypatch.setattr(module, "_scenario", lambda _, seed: scenario_of(selector, seed))
+    """Every registered family keeps every clause of the contract; ends of ranges in turns."""
+    selector, module = name + REQUIRED.get(name, ""), sys.modules[check.__module__]
+    known = {1} if check in MAKE_AGAIN else set()
+    turn, every_end = FAMILIES.index(name) % 2, vars(module)["_ends"]
+
+    def made(family: Family, seed: int) -> Scenario:
+        if check in LOOK_ONLY or seed in known:
+            known.discard(seed)
+            return scenario_of(selector, seed)
+        return family.scenario(seed)
+
+    monkeypatch.setattr(module, "_scenario", made)
+    monkeypatch.setattr(module, "_ends", lambda of: every_end(of)[turn::2] or every_end(of))
     check(make_family(selector))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", FAMILIES)
+def test_every_end_of_every_range_gives_a_scenario_or_says_why_not(name: str) -> None:
+    """The low and the high one of all parameters, and the bounds in which they are drawn."""
+    check_family_ranges(make_family(name + REQUIRED.get(name, "")))
 
 
 @dataclass(frozen=True, kw_only=True)

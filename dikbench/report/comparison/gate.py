@@ -77,7 +77,7 @@ def _falls(success: pd.DataFrame, tolerances: Sequence[Tolerance]) -> list[str]:
     return _few(
         f"success of {named(row)} ({row['plant']} plant, {row['setting']}) fell from "
         f"{100 * row['rate_a']:.1f} to {100 * row['rate_b']:.1f} %"
-        for row in fallen.to_dict("records")
+        for row in fallen.loc[_worst_first(fallen["rate_a"] - fallen["rate_b"])].to_dict("records")
     )
 
 
@@ -96,13 +96,19 @@ def _slower(
     lost = untimed(matched)
     found = [f"{several(lost, 'timed cell')} of A without times in B"] if lost else []
     for tolerance in asked:
-        slower = times[times[RATIOS[tolerance.metric]] > 1 + tolerance.bound]
+        ratio = times[RATIOS[tolerance.metric]]
+        slower = times.loc[_worst_first(ratio[ratio > 1 + tolerance.bound])]
         found += _few(
             f"{named(row)} takes {row[RATIOS[tolerance.metric]]:.3g} times as long "
             f"({tolerance.metric})"
             for row in slower.to_dict("records")
         )
     return found
+
+
+def _worst_first(amount: pd.Series) -> pd.Index:
+    """Order rows by an amount, the largest first."""
+    return amount.sort_values(ascending=False, kind="stable").index
 
 
 def _few(phrases: Iterable[str]) -> list[str]:

@@ -104,6 +104,7 @@ def _solvers(comparison: Comparison, rows: int | None) -> list[str]:
     shares = matched.a[TRIAL].assign(
         before=matched.a[SOLVER_FAILED].fillna(0.0), after=matched.b[SOLVER_FAILED]
     )[newly]
+    shares = shares.loc[(shares["before"] - shares["after"]).sort_values(kind="stable").index]
     lines = [
         f"- {100 * row['before']:.3g} -> {100 * row['after']:.3g} % of the steps without an "
         f"answer: {escape(trial_name(row))}"

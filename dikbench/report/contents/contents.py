@@ -24,7 +24,8 @@ from dikbench.report.tables.failures import Failures, failures
 from dikbench.report.tables.return_codes import return_codes
 from dikbench.report.tables.table import Table
 from dikbench.results.reading import Results
-from dikbench.statistics.failures import SKIPPED, has_failed
+from dikbench.statistics.failures import SKIPPED, has_failed, ran
+from dikbench.statistics.trial_matrix import CONTENDER
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,34 +66,46 @@ class Contents:
 
     @property
     def description(self) -> str:
-        """What the study is, in a sentence."""
+        """What the study is, in a sentence; said to be its plan where not all of it was run."""
         text = str(self.manifest["study"].get("description", "")).strip()
+        if text and missing(self.results.trials, self.manifest):
+            text = f"As it was planned: {text}"
         return text if text.endswith((".", "?", "!")) or not text else f"{text}."
 
     @cached_property
     def counts(self) -> list[tuple[int, str]]:
         """How many trials were run, and how they ended; what did not occur is left out.
 
-        Skipped cells are no trials: they are counted apart.
+        Skipped cells are no trials: they are counted apart. Where more was planned than ran, this
+        is said of trials, formulations, scenarios and seeds.
         """
-        trials = self.results.trials
+        trials, study = self.results.trials, self.manifest["study"]
         status = trials["status"]
-        formulations = trials[["formulation", "solver"]].drop_duplicates()
-        seeds, scenarios = trials["seed"].nunique(), trials["scenario"].nunique()
-        one = len(formulations) == 1
+        rows = ran(trials)
+        skipped = int(status.eq(SKIPPED).sum())
+        absent = {"cells skipped", "missing"}
         found = [
-            (ran := int(status.ne(SKIPPED).sum()), "trial run" if ran == 1 else "trials run"),
+            _of_plan(len(rows), int(self.manifest.get("trials", 0)), "trial run", "trials run"),
             (int(has_failed(trials).sum()), "failed"),
-            (left := int(status.eq(SKIPPED).sum()), f"{'cell' if left == 1 else 'cells'} skipped"),
+            (skipped, f"{'cell' if skipped == 1 else 'cells'} skipped"),
             (missing(trials, self.manifest), "missing"),
-            (
-                len(formulations),
-                "formulation with its solver" if one else "formulations with their solvers",
+            _of_plan(
+                len(rows[CONTENDER].drop_duplicates()),
+                len(trials[CONTENDER].drop_duplicates()),
+                "formulation with its solver",
+                "formulations with their solvers",
             ),
-            (scenarios, "scenario" if scenarios == 1 else "scenarios"),
-            (seeds, "seed" if seeds == 1 else "seeds"),
+            *(
+                _of_plan(
+                    rows[axis].nunique(),
+                    len({*trials[axis], *study.get(f"{axis}s", ())}),
+                    axis,
+                    f"{axis}s",
+                )
+                for axis in ("scenario", "seed")
+            ),
         ]
-        return [(count, what) for count, what in found if count or what in {"trials run", "failed"}]
+        return [(count, what) for count, what in found if count or what not in absent]
 
     @property
     def environment(self) -> list[tuple[str, str]]:
@@ -117,6 +130,13 @@ class Contents:
     def manifest_text(self) -> str:
         """The manifest as it is stored."""
         return json.dumps(self.manifest, indent=2, ensure_ascii=False)
+
+
+def _of_plan(count: int, planned: int, one: str, several: str) -> tuple[int, str]:
+    """Name what was run, with how many were planned where these are more."""
+    if planned > count:
+        return count, f"of {planned} planned {several}"
+    return count, one if count == 1 else several
 
 
 def _versions(of: Any) -> str:

@@ -69,7 +69,7 @@ def label_points(
                     "arrowstyle": "-", "color": "0.6", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2
                 },
             )  # fmt: skip
-    return f" There was no room for the names of {', '.join(left_out)}." if left_out else ""
+    return f" There was no room for the names of {', '.join(sorted(left_out))}." if left_out else ""
 
 
 def _leader(offset: Array, half: Array) -> Array:

@@ -22,9 +22,10 @@ from dikbench.report.selection.rows import (
 )
 from dikbench.report.selection.stored_motions import in_panels
 from dikbench.report.selection.sweeps import FEWEST, number
+from dikbench.report.sentences.words import listed as listed_names
 from dikbench.results.selected import parameters_of
 from dikbench.selector import listed
-from dikbench.statistics.success import DONE
+from dikbench.statistics.success import DONE, with_facts
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,26 +76,40 @@ def draw_formulation_sweeps(ran: pd.DataFrame, target: Path) -> list[Figure]:
         file = file_name("formulation", sweep.formulation, sweep.parameter, place)
         caption = (
             f"{sweep.formulation}{f' ({sweep.others})' if sweep.others else ''} against its "
-            f"{sweep.parameter}, {how(sweep.rows)}: the share of the trials that succeed, the "
-            f"median rms {name} and the largest peak speed, over the scenarios of each family; a "
-            "trial that broke off counts as infinite, and infinity leaves a gap."
+            f"{sweep.parameter}, {how(sweep.rows)}: the share that succeeds of the trials of "
+            f"scenarios that a known motion can do, the median rms {name} and the largest peak "
+            "speed, over all scenarios of each family; a trial that broke off counts as infinite, "
+            f"and infinity leaves a gap.{_without_success(sweep)}"
         )
         title = f"{sweep.formulation} against its {sweep.parameter}"
         figures.append(Figure(_draw(sweep, target, file), caption, title))
     return figures
 
 
+def _without_success(sweep: FormulationSweep) -> str:
+    """Name the families of which no scenario can be done as far as is known."""
+    success = per_family(sweep)["success"].groupby(level="family", sort=False).count()
+    none = sorted(success[success.eq(0)].index)
+    if not none:
+        return ""
+    return f" Without a curve of success: {listed_names(none)}, which no known motion can do."
+
+
 def per_family(sweep: FormulationSweep) -> pd.DataFrame:
-    """Compute per family and value `success` [%], the median `error` [mm], the worst `peak`."""
+    """Compute per family and value `success` [%], the median `error` [mm], the worst `peak`.
+
+    Success is NaN where no scenario of a family is known to be done by any motion.
+    """
     column, _ = error_column(sweep.rows)
-    rows = sweep.rows
+    rows = with_facts(sweep.rows)
+    counts = rows["feasible"].isin(["time", "path"])
     table = pd.DataFrame(
         {
             "family": rows["scenario_family"],
             "value": rows["value"],
             "error": 1e3 * failures_at_infinity(rows, column),
             "peak": failures_at_infinity(rows, "velocity_peak_ratio"),
-            "success": 100.0 * rows["outcome"].isin(DONE).astype(float),
+            "success": 100.0 * rows["outcome"].isin(DONE).astype(float).where(counts),
         }
     )
     groups = table.groupby(["family", "value"], sort=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import pandas as pd
@@ -23,6 +23,7 @@ from dikbench.report.selection.declared import with_unit
 from dikbench.report.selection.phase_grids import PhaseGrid, phase_grids
 from dikbench.report.selection.rows import error_column, failures_at_infinity, how, pages
 from dikbench.scenario.oracle import ORACLES
+from dikbench.scenario.violation import SPEED_TOLERANCE
 
 PER_PAGE = 20
 """Formulations in one figure."""
@@ -32,6 +33,9 @@ GAP = 0.18
 
 LEAST = 1e-9
 """Zeros are drawn as this, at the low end of a logarithmic scale: who idles has a peak speed."""
+
+BROKEN_FROM: Final = float(np.nextafter(SPEED_TOLERANCE, 2.0))
+"""The least peak speed over its limit that breaks it."""
 
 BROKE_OFF = CATEGORIES[-1]
 
@@ -97,16 +101,16 @@ def _maps(grid: PhaseGrid) -> list[_Map]:
     )
     shown = replace(grid, rows=rows)
     errors, peaks = (
-        {name: np.maximum(values, LEAST) for name, values in shown.values(column, "median").items()}
-        for column in ("error_mm", "peak")
+        {name: np.maximum(each, LEAST) for name, each in values.items()}
+        for values in (shown.values("error_mm", "median"), shown.values("peak", "max"))
     )
     over = colormaps["YlOrRd"].with_extremes(under="#d5e3ee")
     return [
         _Map(
             "error",
             name,
-            f"Root mean square {name} [mm] of the motion, however much of the path it did: who "
-            "stands still has none (see the outcomes).",
+            f"Root mean square {name} [mm] of the motion, the median over its seeds, however much "
+            "of the path it did: who stands still has none (see the outcomes).",
             errors,
             colormaps["viridis_r"],
             _log_norm(errors, 1e-2, 1e3),
@@ -116,11 +120,13 @@ def _maps(grid: PhaseGrid) -> list[_Map]:
         _Map(
             "peak_speed",
             "peak speed",
-            "Largest joint speed over its limit; blue where it keeps the limit (to 1 %).",
+            "Largest joint speed over its limit, the worst of its seeds; blue where it keeps the "
+            f"limit, as an outcome counts it (at most {SPEED_TOLERANCE:g} of it), and written as 1 "
+            "or less there; what is just beyond is written as >1.",
             peaks,
             over,
-            _log_norm(peaks, 1.01, 1e2, least=1.01),
-            three_digits,
+            _log_norm(peaks, BROKEN_FROM, 1e2, least=BROKEN_FROM),
+            against_limit,
             "largest joint speed over its limit",
         ),
         _Map(
@@ -270,3 +276,14 @@ def three_digits(value: float) -> str:
     if value < 9.95:
         return f"{value:.1f}"
     return f"{value:.0f}" if value < 999.5 else f"{value:.0e}".replace("e+0", "e")
+
+
+def against_limit(value: float) -> str:
+    """A peak speed over its limit, which is 1 or less where, as outcomes count, the limit is kept.
+
+    Beyond, `>1` stands for what would be rounded to that.
+    """
+    text = three_digits(value)
+    if value < BROKEN_FROM:
+        return "1" if text == "1.0" else text
+    return ">1" if text == "1.0" else text

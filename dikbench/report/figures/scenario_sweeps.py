@@ -72,8 +72,8 @@ def _caption(sweep: Sweep, quantity: _Quantity) -> str:
     )
     return (
         f"{quantity.label[0].upper()}{quantity.label[1:]} against {sweep.parameter} of "
-        f"{sweep.family} ({sweep.others or 'defaults'}), {how(sweep.rows)}, by outcome, then by "
-        f"median error; {curves}. A cross at the top: the trial failed."
+        f"{sweep.family} ({sweep.others or 'defaults'}), {how(sweep.rows)}, medians over the "
+        f"seeds, by outcome, then by median error; {curves}. A cross at the top: every seed failed."
     )
 
 

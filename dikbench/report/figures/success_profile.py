@@ -57,8 +57,8 @@ def draw_success_profiles(trials: pd.DataFrame, target: Path) -> list[Figure]:
     caption = (
         "Success over all situations (families weighed equally) if the tolerance of every scenario "
         "were that of the axis: below 2 mm the sampling is measured, from 20 mm on detours are "
-        f"forgiven. Named are the {len(named)} most successful of those that may be first (see the "
-        f"table of success){others}."
+        f"forgiven. Named are the {len(named)} most successful of those that may be starred (see "
+        f"the table of success){others}."
     )
     return [
         Figure(save(figure, target, "success_over_tolerance"), caption, "Success over tolerance")

@@ -112,7 +112,7 @@ def _td(cell: TableCell, column: Column) -> Markup:
         return Markup('<td class="told" data-sort="-1">{}</td>').format(cell.text)
     if isnan(cell.value):
         return Markup("<td></td>")
-    number = str(int(cell.value)) if column.count else shown(cell.value)
+    number = str(int(cell.value)) if column.count else shown(cell.value, column.most)
     failures = column.key.startswith("fail") and cell.value > 0
     classes = ["best"] * cell.best + ["unstable"] * cell.unstable + ["bad"] * failures
     attributes = f' class="{" ".join(classes)}"' if classes else ""

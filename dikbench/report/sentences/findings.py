@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -13,15 +13,11 @@ import pandas as pd
 from dikbench.arrays import Array, Mask
 from dikbench.metrics import Outcome
 from dikbench.report.selection.judged import IN_WORDS
-from dikbench.report.sentences.words import (
-    Names,
-    listed,
-    number,
-    several,
-)
+from dikbench.report.sentences.sample import cases_in_words
+from dikbench.report.sentences.words import FEW, Names, listed, number, several
 from dikbench.statistics.accuracy import SMALLEST_DISTANCE_M, log_distances
 from dikbench.statistics.failures import ran
-from dikbench.statistics.first_places import FEWEST_SCENARIOS, first_places, told_of, too_few
+from dikbench.statistics.first_places import FEWEST_SCENARIOS, places, told_of, too_few
 from dikbench.statistics.stability import LARGEST_DRIFT_SHARE as DRIFT
 from dikbench.statistics.stability import STABLE
 from dikbench.statistics.success import (
@@ -57,11 +53,12 @@ class Finding:
 
 @dataclass(frozen=True)
 class Leaders:
-    """Who is first in a situation of a setting.
+    """Who is first in a situation of a setting, or may be.
 
     Attributes:
-        contenders: the formulations that are first; empty where there are too few cases.
-        alone: whether somebody else that may be first is not: else nobody stands out.
+        contenders: the candidates that the rows do not exclude from being first, those that are
+            first among them; empty where there are too few cases.
+        alone: whether they are first beyond doubt, and another candidate is not.
         found: the rates of all.
         finding: the sentence.
     """
@@ -73,15 +70,21 @@ class Leaders:
 
 
 def leaders(
-    part: pd.DataFrame, setting: Setting, candidates: Collection[Contender], names: Names
+    part: pd.DataFrame,
+    setting: Setting,
+    candidates: Collection[Contender],
+    names: Names,
+    barred: Mapping[Contender, float] | None = None,
 ) -> Leaders | None:
     """Say who succeeds most in a situation; None where nobody can be named.
 
     Args:
         part: the rows of the situation that count.
         setting: of the rows.
-        candidates: who may be named (see `dependable`).
+        candidates: who may be first (see `dependable`).
         names: how formulations are called.
+        barred: who is no candidate but is named where somebody stands out and it does as well, and
+            the share of all trials in which each is stopped (see `held_back`).
     """
     may_be = told_of(part, candidates)
     found = rates(part, succeeded(part), may_be)
@@ -89,44 +92,71 @@ def leaders(
     rivals = np.array([name in may_be for name in every]) & found.whole
     if too_few(part) and found.rate[rivals].max(initial=0.0) > 0:
         text = (
-            f"success of {_sample(part)}: too few to say who is first ({FEWEST_SCENARIOS} "
+            f"success of {cases_in_words(part)}: too few to say who is first ({FEWEST_SCENARIOS} "
             f"scenarios are asked for); the candidates have {_range(found.rate[rivals])}."
         )
         return Leaders((), False, found, Finding(f"Too few cases where {IN_WORDS[setting]}", text))
-    first = first_places(part, found)
+    first, may_lead = places(part, found, rivals)
     if not first.any():
         return None
-    alone = rivals.sum() == 1 or bool((rivals & ~first).any())
-    order = sorted(np.flatnonzero(first), key=lambda k: -found.rate[k])
-    if alone:
-        question = f"First where {IN_WORDS[setting]}"
+    order = sorted(np.flatnonzero(may_lead), key=lambda k: -found.rate[k])
+    alone = False
+    if rivals.sum() == 1:
+        question = "The only candidate"
+        said = _with_shares([(every[k], found.rate[k]) for k in order], names)
+    elif (first == rivals).all():
+        question, much = "Nobody stands out", _range(found.rate[first])
+        said = f"all {len(order)} candidates have {much}"
+        said += ", not told apart" if " to " in much else ""
+    else:
+        alone = bool((first == may_lead).all())
+        question = "First" if alone else "May be first"
         said = _with_shares([(every[k], found.rate[k]) for k in order], names)
         said += ", not told apart" if len(order) > 1 else ""
-        said += _next(found, rivals & ~found.best, every, names)
-    else:
-        question = f"Nobody stands out where {IN_WORDS[setting]}"
-        much = _range(found.rate[first])
-        said = f"all {len(order)} that may be first have {much}"
-        said += ", not told apart" if " to " in much else ""
-    text = f"success of {_sample(part)}: {said}{_pace(part, setting, first, found)}."
+        slower = np.flatnonzero(rivals & ~may_lead & (found.upper >= 0))
+        if len(slower):
+            by_rate = sorted(slower, key=lambda k: -found.rate[k])
+            said += f"; slower: {_with_shares([(every[k], found.rate[k]) for k in by_rate], names)}"
+        said += _next(found, rivals & (found.upper < 0), every, names)
+    if question != "Nobody stands out":
+        said += _as_good(part, found, barred or {}, float(found.rate[first].max()), names)
+    text = f"success of {cases_in_words(part)}: {said}{_pace(part, setting, may_lead, found)}."
     contenders = tuple(every[k] for k in order)
-    return Leaders(contenders, alone, found, Finding(question, text))
+    return Leaders(contenders, alone, found, Finding(f"{question} where {IN_WORDS[setting]}", text))
 
 
 def _with_shares(of: Sequence[tuple[Contender, float]], names: Names) -> str:
-    """Name formulations with their rates, those of the same rate together."""
+    """Name formulations with their rates, best first, those of the same rate together.
+
+    After a few rates the others are counted.
+    """
     groups: dict[str, list[Contender]] = {}
     for contender, rate in of:
         groups.setdefault(number(100 * rate), []).append(contender)
-    return "; ".join(f"{names.of(group)} with {share} %" for share, group in groups.items())
+    told = [f"{names.of(group)} with {share} %" for share, group in groups.items()]
+    if len(told) > FEW:
+        left = list(groups.items())[FEW - 1 :]
+        ends = f"{left[-1][0]} to {left[0][0]} %"
+        told[FEW - 1 :] = [f"{sum(len(group) for _, group in left)} more with {ends}"]
+    return "; ".join(told)
 
 
-def _sample(part: pd.DataFrame) -> str:
-    """Say over how many cases rates are."""
-    cases = part[["scenario", "seed"]].drop_duplicates()
+def _as_good(
+    part: pd.DataFrame, found: Rates, barred: Mapping[Contender, float], best: float, names: Names
+) -> str:
+    """Name who is no candidate and succeeds as often here as the best of those who are first."""
+    may_be = told_of(part, barred)
+    every = found.contenders.itertuples(index=False, name=None)
+    who = [
+        contender
+        for contender, rate, whole in zip(every, found.rate, found.whole, strict=True)
+        if whole and contender in may_be and rate >= best - ROUNDING
+    ]
+    if not who:
+        return ""
+    stopped = _range(np.array([barred[contender] for contender in who]))
     return (
-        f"{several(len(cases), 'case')} ({several(cases['scenario'].nunique(), 'scenario')}, "
-        f"{several(part['robot'].nunique(), 'robot')})"
+        f"; as successful, but no candidate (stopped in {stopped} of all trials): {names.of(who)}"
     )
 
 
@@ -137,7 +167,7 @@ def _range(rates: Array) -> str:
 
 
 def _next(found: Rates, others: Mask, every: Sequence[Contender], names: Names) -> str:
-    """Name the best of the others, ties together, and by how much they are behind the best."""
+    """Name the best of the other candidates, ties together, and how far behind they are."""
     if not others.any():
         return ""
     most = found.rate[others].max()
@@ -145,30 +175,37 @@ def _next(found: Rates, others: Mask, every: Sequence[Contender], names: Names) 
     low, high = number(-100 * found.upper[who].max()), number(-100 * found.lower[who].min())
     points = low if low == high else f"{low} to {high}"
     named = names.of([every[k] for k in who])
-    return f"; next is {named} with {number(100 * most)} %, {points} points less"
+    return f"; next of the candidates is {named} with {number(100 * most)} %, {points} points less"
 
 
-def _pace(part: pd.DataFrame, setting: Setting, first: Mask, found: Rates) -> str:
-    """Say how much time those who are first take where the path waits."""
+def _pace(part: pd.DataFrame, setting: Setting, who: Mask, found: Rates) -> str:
+    """Say how much time some take where the path waits, over the cases that all of them did.
+
+    Nothing is said where these are of too few scenarios.
+    """
     if setting != "path":
         return ""
     done = part["slow_down"].where(succeeded(part)).to_numpy(dtype=float)
-    columns = found.layout.fill(done)[:, np.flatnonzero(first)].T
-    medians = [float(np.nanmedian(column)) for column in columns if not np.isnan(column).all()]
-    if not medians:
+    matrix = found.layout.fill(done)[:, np.flatnonzero(who)]
+    common: Mask = np.asarray(~np.isnan(matrix).any(axis=1))
+    if found.layout.cases["scenario"][common].nunique() < FEWEST_SCENARIOS:
         return ""
-    low, high = number(min(medians)), number(max(medians))
+    medians = np.median(matrix[common], axis=0)
+    low, high = number(float(medians.min())), number(float(medians.max()))
     much = "" if high == "1" else f"{high} times "
     if low != high:
         much = f"{low} to {high} times "
-    return f". Median time of what was done: {much}the nominal duration"
+    whom = "all of them" if who.sum() > 1 else "it"
+    over = f"{several(int(common.sum()), 'case')} that {whom} did"
+    return f". Median time over the {over}: {much}the nominal duration"
 
 
 def most_accurate(part: pd.DataFrame, leading: Leaders, names: Names) -> Finding | None:
-    """Say who of the first is nearest to the path, in the cases that all of them did.
+    """Say who of those that may be first is nearest to the path, in the cases that all of them did.
 
     Distances and ratios are geometric means over these cases, paired (see `log_distances`). None
-    where they are alike, or where there is one alone.
+    where they are alike, where there is one alone, or where the nearest and the next one differ by
+    more than rounding in fewer than `FEWEST_SCENARIOS` scenarios.
     """
     if len(leading.contenders) < 2:
         return None
@@ -177,7 +214,7 @@ def most_accurate(part: pd.DataFrame, leading: Leaders, names: Names) -> Finding
     columns = [every.index(name) for name in leading.contenders]
     matrix = found.layout.fill(log_distances(part))[:, columns]
     common = ~np.isnan(matrix).any(axis=1)
-    if common.sum() < 2:
+    if not common.any():
         return None
     matrix[~common] = np.nan
     away = 1e3 * np.exp(paired_means(matrix, found)[0])
@@ -187,6 +224,10 @@ def most_accurate(part: pd.DataFrame, leading: Leaders, names: Names) -> Finding
     if not len(behind):
         return None
     second = behind[means[behind].argmin()]
+    apart = np.abs(np.exp(matrix[:, second]) - np.exp(matrix[:, best])) > SMALLEST_DISTANCE_M
+    differing = found.layout.cases["scenario"][apart].nunique()
+    if differing < FEWEST_SCENARIOS:
+        return None
     together = np.flatnonzero(means < means[second])
     low, high = number(float(away[together].min())), number(float(away[together].max()))
     floor = number(1e3 * SMALLEST_DISTANCE_M)
@@ -195,7 +236,8 @@ def most_accurate(part: pd.DataFrame, leading: Leaders, names: Names) -> Finding
         f"{low if low == high else f'{low} to {high}'} mm from the path at most; next is "
         f"{names.of([leading.contenders[second]])}, {number(float(np.exp(means[second])))} times "
         f"as far as the nearest (geometric means, paired over the {int(common.sum())} cases that "
-        f"all of the first did; less than {floor} mm counts as {floor} mm, angles with 0.2 m)"
+        f"all of them did, in {differing} scenarios of which they are more than {floor} mm apart; "
+        f"less than {floor} mm counts as {floor} mm, angles with 0.2 m)"
     )
     return Finding("Most accurate", f"{text}.")
 
@@ -208,13 +250,14 @@ def broke_off(rows: pd.DataFrame, names: Names) -> Finding | None:
         return None
     totals = rows.groupby(CONTENDER, sort=False).size()
     said = []
-    for (formulation, solver), part in failed.groupby(CONTENDER, sort=False):
+    for (formulation, solver), part in failed.groupby(CONTENDER):
         contender = (str(formulation), str(solver))
-        counts = part["status"].value_counts().items()
+        counts = sorted(part["status"].value_counts().items(), key=lambda pair: (-pair[1], pair[0]))
         reasons = listed([f"{count} {status}" for status, count in counts])
         total = totals[contender]
-        said.append(f"{names.of([contender])} in {len(part)} of {total} trials ({reasons})")
-    return Finding("Broke off", f"{listed(said)}.")
+        text = f"{names.of([contender])} in {len(part)} of {total} trials ({reasons})"
+        said.append((-len(part) / total, text))
+    return Finding("Broke off", f"{listed([text for _, text in sorted(said)])}.")
 
 
 def unanswered(rows: pd.DataFrame, names: Names) -> Finding | None:
@@ -258,11 +301,11 @@ def first_most_often(
 
 
 def fastest(rows: pd.DataFrame, among: Collection[Contender], names: Names) -> Finding | None:
-    """Say whose call takes the least time of those that may be first; None of fewer than two.
+    """Say whose call takes the least time of the candidates; None of fewer than two.
 
     Args:
         rows: trials, of any plant.
-        among: who may be first.
+        among: the candidates.
         names: how they are called.
     """
     cells = rows.drop_duplicates([*CONTENDER, "scenario"])
@@ -285,4 +328,4 @@ def fastest(rows: pd.DataFrame, among: Collection[Contender], names: Names) -> F
     unstable = int(cells["timing_stability"].ne(STABLE).sum())
     if unstable:
         text += f"; of {len(cells)} timed cells {unstable} cannot be trusted"
-    return Finding("Fastest of those that may be first", f"{text}.")
+    return Finding("Fastest of the candidates", f"{text}.")

@@ -124,9 +124,11 @@ def _times(trials: pd.DataFrame) -> list[Limitation]:
                 f"Of {len(cells)} timed cells {len(unstable)} are not stable (greyed; timing.csv "
                 "says why); `dikbench time` takes them anew, on a machine that does nothing else.",
                 tuple(
-                    f"{_named(formulation, solver)} on {quoted(scenario)}: {stability}."
-                    for (formulation, solver, scenario, stability), _ in _counted(
-                        unstable, [*CONTENDER, "scenario", "timing_stability"]
+                    sorted(
+                        f"{_named(formulation, solver)} on {quoted(scenario)}: {stability}."
+                        for (formulation, solver, scenario, stability), _ in _counted(
+                            unstable, [*CONTENDER, "scenario", "timing_stability"]
+                        )
                     )
                 ),
             )
@@ -189,14 +191,19 @@ def _broken(trials: pd.DataFrame) -> list[Limitation]:
 
 
 def _reasons(rows: pd.DataFrame, what: str) -> tuple[str, ...]:
-    """Say how often each status and message occurs, with which formulations and scenarios."""
+    """Say how often each status and message occurs, with which formulations and scenarios.
+
+    What occurs most often comes first, names in order of the alphabet.
+    """
     cases = []
     for (status, message), part in rows.groupby(["status", "message"], sort=False):
         contenders = part[CONTENDER].drop_duplicates().itertuples(index=False, name=None)
-        names = listed([_named(*contender) for contender in contenders])
-        scenarios = listed([quoted(text) for text in part["scenario"].unique()], most=FEW_SCENARIOS)
-        cases.append(f"{several(len(part), what)} {status}: {message} ({names}; on {scenarios}).")
-    return tuple(cases)
+        names = listed([_named(*contender) for contender in sorted(contenders)])
+        scenarios = sorted(quoted(text) for text in part["scenario"].unique())
+        on = listed(scenarios, most=FEW_SCENARIOS)
+        text = f"{several(len(part), what)} {status}: {message} ({names}; on {on})."
+        cases.append((-len(part), text))
+    return tuple(text for _, text in sorted(cases))
 
 
 def _steps(trials: pd.DataFrame) -> list[Limitation]:
@@ -220,7 +227,8 @@ def _steps(trials: pd.DataFrame) -> list[Limitation]:
             "Acceleration bounds that were given up, where limits contradict one another.",
         ),
     ):
-        worst = trials.groupby(CONTENDER, sort=False)[column].max().reset_index()
+        worst = trials.groupby(CONTENDER)[column].max().reset_index()
+        worst = worst.sort_values(column, ascending=False, kind="stable")
         cases = tuple(
             f"{_named(formulation, solver)}: in up to {number(100 * share)} % of a run's steps."
             for formulation, solver, share in worst.itertuples(index=False, name=None)

@@ -30,6 +30,7 @@ from dikbench.statistics.first_places import (
     MOST_BROKEN_SHARE,
     SMALLEST_SHARE_OF_BEST,
     dependable,
+    held_back,
 )
 from dikbench.statistics.success import MOST_BEHIND, Contender, Setting, with_facts
 
@@ -86,6 +87,7 @@ def summarise(trials: pd.DataFrame) -> Summary:
     of_setting = {setting: judged_rows(trials, setting) for setting in SETTINGS}
     every = rows_of_all(of_setting)
     candidates = {setting: dependable(rows, every) for setting, rows in of_setting.items()}
+    barred = {setting: held_back(rows, every) for setting, rows in of_setting.items()}
     chapters = []
     firsts: list[tuple[Setting, tuple[Contender, ...]]] = []
     for situation, definition in DEFINITIONS.items():
@@ -94,7 +96,9 @@ def summarise(trials: pd.DataFrame) -> Summary:
         for setting, rows in of_setting.items():
             part = rows[rows["situation"].eq(situation)]
             scenarios |= dict.fromkeys(part["scenario"].unique())
-            leading = leaders(part, setting, candidates[setting], names) if len(part) else None
+            if part.empty:
+                continue
+            leading = leaders(part, setting, candidates[setting], names, barred[setting])
             if leading is None:
                 continue
             if leading.alone:
@@ -125,7 +129,9 @@ def _basis(trials: pd.DataFrame) -> str:
         "with a seed) that a known motion can do. Who is stopped by a limit that it is told of, by "
         f"a collision or a failure in more than {100 * MOST_BROKEN_SHARE:g} % of them, or succeeds "
         f"overall in at most {100 * SMALLEST_SHARE_OF_BEST:g} % of what the best of the others "
-        "does, may not be first; first is who of the rest cannot be told apart from the best "
-        f"(95 % paired intervals), is at most {100 * MOST_BEHIND:g} points behind it and is not "
-        f"slower than another of them, where at least {FEWEST_SCENARIOS} scenarios count."
+        "does, is no candidate, however well it does in a situation (see the table of success). "
+        f"First is who is at most {100 * MOST_BEHIND:g} points behind the best candidate, cannot "
+        "be told apart from it (95 % paired intervals) and is not slower than another of them, "
+        "where every other candidate can be told apart; where one cannot, they all may be first. "
+        f"Nobody is named where fewer than {FEWEST_SCENARIOS} scenarios count."
     )

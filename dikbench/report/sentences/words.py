@@ -63,9 +63,12 @@ class Names:
         self._solvers = pairs.groupby("formulation", sort=False)["solver"].agg(list).to_dict()
 
     def of(self, contenders: Iterable[Contender]) -> str:
-        """The formulations in words: `dls`, `qp` (all 8 solvers) and `lp-alpha` (daqp)."""
+        """The formulations in words, in order of the alphabet, whatever the order of the rows.
+
+        Such as: `dls`, `lp-alpha` (`daqp`) and `qp` (all 8 solvers).
+        """
         groups: dict[str, list[str]] = {}
-        for formulation, solver in contenders:
+        for formulation, solver in sorted(contenders):
             groups.setdefault(formulation, []).append(solver)
         return listed([self._named(*group) for group in groups.items()])
 
@@ -73,7 +76,7 @@ class Names:
         name, every = quoted(formulation), self._solvers[formulation]
         if len(every) == 1:
             return name
-        others = [solver for solver in every if solver not in solvers]
+        others = sorted(solver for solver in every if solver not in solvers)
         if not others:
             return f"{name} ({'both' if len(every) == 2 else f'all {len(every)}'} solvers)"
         if len(others) < len(solvers):

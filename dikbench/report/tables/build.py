@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from math import ceil, nan
+from math import ceil, inf, nan
 from typing import Literal
 
 import numpy as np
@@ -12,7 +12,15 @@ import pandas as pd
 
 from dikbench.arrays import Array
 from dikbench.metrics import METRICS
-from dikbench.report.tables.kinds import DERIVED, Quantity, Statistic, TableKind
+from dikbench.report.tables.in_force import ACCELERATION, notes_on_limits, with_acceleration_limits
+from dikbench.report.tables.kinds import (
+    DERIVED,
+    LIMIT_VIOLATION,
+    MOST,
+    Quantity,
+    Statistic,
+    TableKind,
+)
 from dikbench.report.tables.table import ALL, Block, Column, Table, TableCell, TableRow
 from dikbench.statistics.failures import failures_at_worst, ran
 from dikbench.statistics.first_places import BROKEN
@@ -49,6 +57,8 @@ def make_table(kind: TableKind, trials: pd.DataFrame) -> Table:
     chosen = [q for q in kind.quantities if q.of in {*trials.columns, *DERIVED}]
     if not any(q.shown for q in chosen if q.of not in DERIVED):  # older results
         chosen = [replace(q, shown=place < SHOWN) for place, q in enumerate(chosen)]
+    if not with_acceleration_limits(trials):
+        chosen = [replace(q, shown=q.shown and q.of != ACCELERATION) for q in chosen]
     needed = {*_READ, *(quantity.of for quantity in chosen)}
     rows = _derived(ran(trials[[name for name in trials if name in needed]]))
     if kind.times and not rows["timed"].any():
@@ -67,7 +77,7 @@ def make_table(kind: TableKind, trials: pd.DataFrame) -> Table:
         kind.title,
         columns,
         tuple(blocks),
-        tuple(_notes(kind) if blocks else ()),
+        tuple(_notes(kind, trials) if blocks else ()),
         kind.empty,
     )
 
@@ -80,6 +90,7 @@ def _column(quantity: Quantity) -> Column:
         better=_better(quantity),
         count=quantity.statistic is Statistic.NUMBER,
         shown=quantity.shown,
+        most=quantity.factor * MOST.get(quantity.of, inf),
     )
 
 
@@ -173,13 +184,31 @@ def _taken(quantity: Quantity, values: Array) -> float:
     return float(defined[max(ceil(at * len(defined) - ROUNDING) - 1, 0)])
 
 
-def _notes(kind: TableKind) -> Iterator[str]:
+def _notes(kind: TableKind, trials: pd.DataFrame) -> Iterator[str]:
     """Say how the numbers of a table were taken."""
     if kind.times:
+        yield (
+            "Median and worst are over the scenarios on which the formulation was timed (their "
+            f"number stands first), each counting once; the median is {_smallest('half')}. The "
+            "median and the 99 % of the calls are those of each scenario's recorded calls."
+        )
         yield "Times are marked as not to be trusted where half of the timed cells are unstable."
         return
     yield (
         "Every run counts, whatever came of it; one that broke off takes the worst value that a "
         "metric has, which may be infinite. Formulations are compared in the table of success."
     )
+    yield (
+        "Median, 95 % and worst are over the runs of a row (their number stands first): all "
+        "scenarios and seeds with this plant and reference, those that nothing can do too, each "
+        "counting once, not weighed as rates of success are. Where a quantity is not defined in a "
+        f"run, the run is left out. Median and 95 % are {_smallest('half, or 95 %,')}."
+    )
     yield "Distances from the path and the target count angles with 0.2 m."
+    if kind is LIMIT_VIOLATION:
+        yield from notes_on_limits(trials)
+
+
+def _smallest(share: str) -> str:
+    """Define the quantile of a share."""
+    return f"the smallest value that {share} of them do not exceed, which occurred"

@@ -98,5 +98,5 @@ def _text(column: Column, cell: TableCell) -> str:
         return ""
     if column.count:
         return f"{cell.value:.0f} "
-    number = f"{cell.value:.0f}" if column.whole else shown(cell.value)
+    number = f"{cell.value:.0f}" if column.whole else shown(cell.value, column.most)
     return number + "?" * cell.unstable + ("*" if cell.best else " ")

@@ -32,7 +32,7 @@ CASES_OF_EACH: Final = 3
 """At most so many cases of each formulation with its solver are shown, ..."""
 
 CASES: Final = 40
-"""... and so many in all."""
+"""... and so many in all, unless more formulations failed: each is shown with its worst case."""
 
 ID_DIGITS: Final = 8
 """So much of a trial's id is shown, which is enough for `dikbench replay`."""
@@ -143,12 +143,28 @@ def failures(trials: pd.DataFrame) -> Failures:
     worst_first = failed.iloc[order.index]
     number = worst_first.groupby(_CASE, sort=False)["id"].transform("size")
     cases = worst_first.assign(number=number).drop_duplicates(_CASE)
-    told = cases[cases.groupby(CONTENDER, sort=False).cumcount() < CASES_OF_EACH].head(CASES)
+    told = _of_every_formulation(cases)
     told_rows: list[Any] = told.to_dict("records")
     return Failures(
         pd.DataFrame([_told(row) for row in told_rows]),
         _note(rows["counts"], failed["counts"], len(cases), len(told)),
     )
+
+
+def _of_every_formulation(cases: pd.DataFrame) -> pd.DataFrame:
+    """Choose the cases that are shown, formulations in turn: the worst of each, then the next one.
+
+    Who fails worst in many cases, as a law that ignores limits does, leaves room for the others.
+
+    Args:
+        cases: worst first.
+    """
+    few = cases[cases.groupby(CONTENDER, sort=False).cumcount() < CASES_OF_EACH]
+    turn = few.groupby("formulation", sort=False).cumcount()
+    most = max(CASES, few["formulation"].nunique())
+    chosen = turn.sort_values(kind="stable").index[:most]
+    found: pd.DataFrame = few[few.index.isin(chosen)]
+    return found
 
 
 def _note(rows: pd.Series, failed: pd.Series, cases: int, told: int) -> str:
@@ -167,7 +183,8 @@ def _note(rows: pd.Series, failed: pd.Series, cases: int, told: int) -> str:
     )
     if told < cases:
         text += (
-            f", at most {CASES_OF_EACH} of a formulation with its solver; {cases - told} more "
+            f", at most {CASES_OF_EACH} of a formulation with its solver, and one at least of each "
+            f"formulation that failed; {cases - told} more "
             f"case{'s are' if cases - told > 1 else ' is'} left out here"
         )
     return (
@@ -214,6 +231,9 @@ def _told(row: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "formulation": contender_name(row["formulation"], row["solver"]),
         "scenario": row["scenario"],
+        "reference": row["reference"],
+        "seed": int(row["seed"]),
+        "plant": row["plant"],
         "outcome": row["outcome"] + ("" if row["counts"] else " (does not count)"),
         "at step": f"{step} of {int(row['steps'])}" if step >= 0 else "",
         "what": short if quantity is None else quantity.name,

@@ -11,7 +11,14 @@ from typing import Final
 
 from dikbench.metrics import METRICS
 from dikbench.report.sentences.words import NOT_TIMED
+from dikbench.report.tables.in_force import ACCELERATION
 from dikbench.results.columns import TIMES
+from dikbench.scenario.violation import (
+    COLLISION_TOLERANCE_M,
+    POSITION_TOLERANCE,
+    SPEED_TOLERANCE,
+    TORQUE_TOLERANCE,
+)
 
 MM: Final = 1e3
 DEG: Final = degrees(1.0)
@@ -21,10 +28,21 @@ MS: Final = 1e-3
 milliseconds of microseconds."""
 
 
+MOST: Final[Mapping[str, float]] = MappingProxyType(
+    {
+        "velocity_peak_ratio": SPEED_TOLERANCE,
+        "position_violation_max_rad": POSITION_TOLERANCE,
+        "distance_violation_max_m": COLLISION_TOLERANCE_M,
+        "torque_usage_max": TORQUE_TOLERANCE,
+    }
+)
+"""The largest value of a column of the trials that breaks no limit."""
+
+
 class Statistic(Enum):
     """How the runs of a row become one number; its value is how notes say it."""
 
-    MEDIAN = "median"
+    MEDIAN = "median (half of the runs are at least as good as this)"
     P95 = "95 % of the runs are at least as good as this"
     WORST = "worst run"
     MEAN = "mean"
@@ -162,7 +180,10 @@ LIMIT_VIOLATION: Final = TableKind(
         *_spread("position_violation_max_rad", "position outside", "deg", DEG, _WORST),
         *_spread("distance_violation_max_m", "distance missing", "mm", MM, _WORST),
         *_spread("torque_usage_max", "torque over limit", "", 1.0, _WORST),
-        *_more("acceleration_violation_max_rad_s2", "acceleration above limit rad s2"),
+        Quantity(ACCELERATION, Statistic.WORST, "acceleration above limit worst [rad/s2]",
+                 "acceleration_above_limit_rad_s2_worst"),
+        *_spread(ACCELERATION, "acceleration above limit rad s2", "", 1.0,
+                 Statistic.MEDIAN, Statistic.P95, shown=False),
         *_more("velocity_violation_max_rad_s", "speed above limit rad s"),
         *_more("violating_share", "steps that violate", "%", PERCENT),
         *_more("torque_violating_share", "steps with too much torque", "%", PERCENT),
@@ -172,7 +193,7 @@ LIMIT_VIOLATION: Final = TableKind(
         *_more("not_verified_share", "steps not verified", "%", PERCENT),
         *_more("optimum_distance_max_rad_s", "from the optimum rad s"),
     ),
-)
+)  # fmt: skip
 
 TIMING: Final = TableKind(
     "timing",

@@ -192,15 +192,17 @@ def _cell(column: Column, cell: TableCell) -> str:
         return ""
     if column.count:
         return str(int(cell.value))
-    text = f"{cell.value:.0f}" if column.whole else _number(cell.value)
+    text = f"{cell.value:.0f}" if column.whole else _number(cell.value, column.most)
     if cell.best:
         text = f"\\textbf{{\\boldmath{text}}}" if "$" in text else f"\\textbf{{{text}}}"
     return f"\\textcolor{{gray}}{{{text}}}" if cell.unstable else text
 
 
-def _number(value: float) -> str:
-    r"""A number in text, a power of ten as \times 10^k."""
+def _number(value: float, most: float) -> str:
+    r"""A number in text, a power of ten as \times 10^k; what is just beyond a limit as >."""
     text = shown(value)
+    if shown(value, most) != text:  # there is no room for more digits
+        return f"$>${text}"
     if "inf" in text:
         return text.replace("inf", r"$\infty$").replace("-", "$-$")
     mantissa, _, exponent = text.partition("e")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from math import isnan
+from math import inf, isnan
 
 import pandas as pd
 
@@ -106,7 +106,7 @@ def _cell(column: Column, cell: TableCell) -> str:
         return ""
     if column.count:
         return str(int(cell.value))
-    text = _number(cell.value)
+    text = _number(cell.value, column.most)
     if cell.best:
         text = f"**{text}**"
     if cell.has_interval:
@@ -114,5 +114,5 @@ def _cell(column: Column, cell: TableCell) -> str:
     return text + "†" * cell.unstable
 
 
-def _number(value: float) -> str:
-    return "" if isnan(value) else shown(value).replace("inf", "∞")
+def _number(value: float, most: float = inf) -> str:
+    return "" if isnan(value) else shown(value, most).replace("inf", "∞")

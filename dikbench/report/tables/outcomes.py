@@ -103,7 +103,7 @@ def outcome_table(trials: pd.DataFrame) -> Table:
     ]
     notes = (
         "Each trial has one outcome, the first in this order that applies; rates are means as in "
-        "the table of success.",
+        "the table of success; `coped` is a plain share of the trials, none of which counts above.",
     )
     return Table("outcomes", TITLE, (*columns, *_RATES), tuple(blocks), notes, NO_OUTCOMES)
 

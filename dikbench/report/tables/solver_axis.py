@@ -104,7 +104,10 @@ def solver_axis(trials: pd.DataFrame) -> Table:
     )
     notes = (
         "Steps and residuals are of all runs, success of those that are judged.",
-        "Times are those of the timing pass." if timed else NOT_TIMED,
+        "Times are those of the timing pass, medians over the scenarios on which a row was timed "
+        "(of an even number the mean of the two in the middle)."
+        if timed
+        else NOT_TIMED,
     )
     return Table(SOLVERS, "Solvers on the same formulations", columns, blocks, notes)
 

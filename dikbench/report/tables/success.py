@@ -20,6 +20,7 @@ from dikbench.report.selection.judged import (
     judged_rows,
     rows_of_all,
 )
+from dikbench.report.sentences.sample import cases_in_words, scenarios_in_words
 from dikbench.report.sentences.words import several
 from dikbench.report.tables.table import (
     ALL,
@@ -84,7 +85,7 @@ def success_table(trials: pd.DataFrame) -> Table:
     )
     plant, every = judged_plant(trials), rows_of_all(of_setting)
     blocks = [
-        Block(ALL, plant, setting, _rows(rows, candidates, situations), _too_few(rows, situations))
+        Block(ALL, plant, setting, _rows(rows, candidates, situations), _sizes(rows, situations))
         for setting, rows, candidates in (
             (setting, rows, dependable(rows, every)) for setting, rows in found.items()
         )
@@ -92,15 +93,18 @@ def success_table(trials: pd.DataFrame) -> Table:
     return Table("success", TITLE, columns, tuple(blocks), tuple(_notes(trials)), NO_OUTCOMES)
 
 
-def _too_few(rows: pd.DataFrame, situations: Sequence[Situation]) -> str:
-    """Name the situations of a setting in which too few scenarios count for a star."""
+def _sizes(rows: pd.DataFrame, situations: Sequence[Situation]) -> str:
+    """Say of a setting which columns are of too few scenarios for a star, and of what each is."""
     parts = {situation: rows[rows["situation"].eq(situation)] for situation in situations}
     few = [
         f"{situation} ({several(part['scenario'].nunique(), 'scenario')})"
         for situation, part in parts.items()
         if len(part) and too_few(part)
     ]
-    return f"Too few cases for stars: {', '.join(few)}." if few else ""
+    said = [f"{name}: {scenarios_in_words(part)}" for name, part in parts.items() if len(part)]
+    return (f"Too few cases for stars: {', '.join(few)}. " if few else "") + (
+        f"Samples: {'. '.join(said)}."
+    )
 
 
 def _rows(
@@ -191,12 +195,12 @@ def _sample(parts: dict[Setting, pd.DataFrame]) -> str:
     """Say how many cases the numbers of a column are over."""
     said = []
     for setting, rows in parts.items():
-        cases = rows[["scenario", "seed"]].drop_duplicates()
-        families, robots = rows["scenario_family"].nunique(), rows["robot"].nunique()
+        if rows.empty:
+            continue
+        families = rows["scenario_family"].nunique()
         said.append(
-            f"{several(len(cases), 'case')} of {several(cases['scenario'].nunique(), 'scenario')}, "
-            f"{families} {'family' if families == 1 else 'families'} and "
-            f"{several(robots, 'robot')} where {IN_WORDS[setting]}"
+            f"{cases_in_words(rows)} of {families} {'family' if families == 1 else 'families'} "
+            f"where {IN_WORDS[setting]}"
         )
     return "; ".join(said)
 
@@ -211,13 +215,16 @@ def _notes(trials: pd.DataFrame) -> list[str]:
         "of its path, does all of it in its order and, by the clock, is not late; where only a "
         "path that waits can be followed, the clock asks that the robot gives way and comes back.",
         "Where the path may wait, the reference waits for the robot; targets at rest are in both.",
-        "A rate is a mean over families of means over robots of means over scenarios and seeds.",
+        "A rate is a mean over families of means over robots of means over scenarios and seeds, so "
+        "that one scenario of one robot may weigh as much as several of another (see the samples).",
         "Who may be starred is stopped by a limit that it is told of, a collision or a failure in "
         f"at most {100 * MOST_BROKEN_SHARE:g} % of all trials, and successful overall in more than "
         f"{100 * SMALLEST_SHARE_OF_BEST:g} % of what the best of those is. A star: not told apart "
         f"from the best of those here and at most {100 * MOST_BEHIND:g} points behind it (ties are "
         "all starred), and not slower than another of them by a ratio of more than "
-        f"{FASTER:g}. Where fewer than {FEWEST_SCENARIOS} scenarios count nobody is starred.",
+        f"{FASTER:g}. Where fewer than {FEWEST_SCENARIOS} scenarios count nobody is starred. "
+        "Without a star one is worse, or slower, only where the interval is below 0: where it "
+        "holds 0 the trials do not tell the two apart.",
         "In brackets stands the 95 % interval of the difference to the best of those that may be "
         "starred, in points, from a bootstrap over families, robots, scenarios and seeds, trials "
         "paired; none where it has no width.",

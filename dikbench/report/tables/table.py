@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isnan, nan
+from math import inf, isnan, nan
 from typing import Literal
 
 ALL = "all"
@@ -20,11 +20,21 @@ ROUNDING = 1e-9
 """What is smaller than this is rounding, and shown as 0 (CSV keeps it)."""
 
 
-def shown(value: float) -> str:
-    """A number as it is read: `DIGITS` significant digits, 0 where it is rounding."""
+def shown(value: float, most: float = inf) -> str:
+    """A number as it is read: `DIGITS` significant digits, 0 where it is rounding.
+
+    Args:
+        value: the number.
+        most: the largest one that breaks no limit; what breaks it is not rounded to one that does
+            not, but has as many digits as that takes.
+    """
     if abs(value) < ROUNDING:
         return "0"
     text = f"{value:.{DIGITS}g}"
+    digits = DIGITS
+    while float(text) <= most < value:
+        digits += 1
+        text = f"{value:.{digits}g}"
     return f"{float(text):.0f}" if 1e3 <= abs(float(text)) < 1e6 else text
 
 
@@ -43,6 +53,7 @@ class Column:
         shown: whether it is shown, or stands in the CSV alone.
         short: its heading where there is little room; empty: `heading`.
         whole: whether it is rounded to whole numbers where there is little room.
+        most: the largest number in it that breaks no limit (see `shown`).
     """
 
     key: str
@@ -54,6 +65,7 @@ class Column:
     shown: bool = True
     short: str = ""
     whole: bool = False
+    most: float = inf
 
 
 @dataclass(frozen=True)

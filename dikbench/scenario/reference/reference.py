@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -70,8 +70,8 @@ class Reference:
         rotations = np.array([X.rotation for X in placed]).reshape(-1, 3, 3)
         return rotations, np.array([X.translation for X in placed]).reshape(-1, 3)
 
-    def targets(self, times: Array) -> list[Any]:
-        """Compute the placements (`pinocchio.SE3`) at nominal times (n,) [s].
+    def targets(self, times: Array) -> Iterable[Any]:
+        """Compute the placements (`pinocchio.SE3`) at nominal times (n,) [s], to be read once.
 
         Raises:
             DikbenchError: if one has no rotation.
@@ -85,7 +85,7 @@ class Reference:
         off = np.abs(R.mT @ R - np.eye(3)).sum(axis=(1, 2)) + np.abs(np.linalg.det(R) - 1)
         for k in np.flatnonzero(~(off < ROTATION_ROUNDING / 4)):
             check_rotation("reference", R[k])
-        return [pin.SE3(*each) for each in zip(R, p, strict=True)]
+        return map(pin.SE3, R, p)
 
 
 def target_at_rest(target: Any, duration: float) -> Reference:

@@ -16,12 +16,14 @@ from typing import get_args
 import pandas as pd
 import pytest
 from click.testing import CliRunner, Result
+from makers.runs import without_workers
 from makers.urdfs import SIX, write_arm
 
 from dikbench.cli import commands
 from dikbench.cli.listing import listing
 from dikbench.metrics import METRICS, Outcome
 from dikbench.plugins.finding import plugins
+from dikbench.report import write
 from dikbench.scenario.plant import REFERENCE_MODES
 from dikbench.scenario.witness import Feasible
 
@@ -78,25 +80,28 @@ def test_help_does_not_import_anything_heavy() -> None:
     assert "run" in done.stdout
 
 
+ON_REACH = ("run", "--scenario", "reach")
+"""Of one scenario: those of a whole study would be built before some faults are found."""
+
 MALFORMED = [
     (("run", "nosuch"), ("nosuch", "quick")),
-    (("run", "--formulation", "dls[damping=many]"), ("damping", "a number, finite and")),
+    ((*ON_REACH, "--formulation", "dls[damping=many]"), ("damping", "a number, finite and")),
     (("run", "--formulation", "dls[dampin=1]"), ("dampin", "valid: damping")),
     (("run", "--formulation", "nofile.py:Formulation"), ("nofile.py",)),
-    (("run", "--solver", "osqp[eps=1]"), ("eps", "eps_abs")),
+    ((*ON_REACH, "--solver", "osqp[eps=1]"), ("eps", "eps_abs")),
     (("run", "--scenario", "reach[robot=bad.urdf,frame=tip]"), ("bad.urdf", "URDF")),
     (("run", "--scenario", "near-miss[robot=talos,singularity=wrist]"), ("wrist", "elbow")),
     (("run", "--scenario", "reach[gain=1||2]"), ("gain", "empty")),
-    (("run", "--plant", "ideal[delay=-1]"), ("delay=-1", "0 to")),
-    (("run", "train", "--seed", "0"), ("seed 0", "1 to 99")),
+    ((*ON_REACH, "--plant", "ideal[delay=-1]"), ("delay=-1", "0 to")),
+    ((*ON_REACH, "train", "--seed", "0"), ("seed 0", "1 to 99")),
     (("show", "near-miss", "--figure", "a.gif"), ("a.gif", ".svg, .png, .pdf")),
     (("show", "near-miss", "--figure", "no/such/a.png"), ("no/such/a.png", "No such file")),
     (("show", "dls", "--figure", "a.png"), ("dls", "dikbench list scenarios")),
     (("run", "--scenario", "reach[duration=1e15]"), ("steps", "valid")),
-    (("run", "--plant", "perfect"), ("perfect", "ideal")),
+    ((*ON_REACH, "--plant", "perfect"), ("perfect", "ideal")),
     (("run", "--reference", "space"), ("space", "path")),
     (("run", "--seed", "-1"), ("-1",)),
-    (("run", "--out", "afile/inside", "--formulation", "dls"), ("afile/inside",)),
+    ((*ON_REACH, "--out", "afile/inside", "--formulation", "dls"), ("afile/inside",)),
     (("recompute", "nowhere"), ("no results", "nowhere")),
     (("list", "laws"), ("laws", "formulations")),
     (("show", "nowhere.urdf"), ("robot file not found: nowhere.urdf",)),
@@ -122,7 +127,7 @@ MALFORMED = [
     (("check", "bad.py"), ("valid: bad.py:Law",)),
     (("run", "--scenario", "bad.py"), ("bad.py:Way",)),
     (("run", "--formulation", "bad.py"), ("bad.py:Law",)),
-    (("run", "--formulation", "bad.py:Thawed"), ("bad.py:Thawed", "@dataclass(frozen=True)")),
+    ((*ON_REACH, "--formulation", "bad.py:Thawed"), ("bad.py:Thawed", "@dataclass(frozen=True)")),
     (
         ("run", "--formulation", "bad.py:Low"),
         ("'Low'", "did you mean 'Law'", "valid: Law, Thawed, Way"),
@@ -210,7 +215,12 @@ scenarios = ["reach"]
 formulations = ["dls[damping=0.1|x|0.2]"]
 """
 
-
+UNTIMED = """
+description = "a study without times"
+scenarios = ["reach"]
+[[cells]]
+formulations = ["dls"]
+"""
 NEEDS = """
 from dataclasses import dataclass
 
@@ -252,6 +262,7 @@ def run_all(
         (each / "cwd" / "afile").touch()
         (each / "cwd" / "bad.py").write_text(CLASSES)
         (each / "cwd" / "bad.toml").write_text(SWEEP)
+        (each / "cwd" / "untimed.toml").write_text(UNTIMED)
         (each / "cwd" / "needs.py").write_text(NEEDS)
         (each / "cwd" / "gantry.urdf").write_text(GANTRY)
     command = [sys.executable, "-c", ONE_AFTER_THE_OTHER, json.dumps(commands)]
@@ -286,6 +297,7 @@ def test_malformed_input_is_one_line_and_exit_code_two(refused: list[Path], numb
         "bad.urdf",
         "gantry.urdf",
         "needs.py",
+        "untimed.toml",
     }
 
 
@@ -313,7 +325,8 @@ def test_a_plugin_of_another_project_is_listed_and_runs(tmp_path: Path) -> None:
         "[dikbench.formulations]\nmine = my_laws\n[dikbench.scenarios]\nmine = my_scenarios\n"
     )
     scenario = "my-family[distance=0.1,duration=0.2]"
-    run = ("run", "--formulation", "my-formulation[gain=2]", "--scenario", scenario)
+    study = ("run", "untimed.toml", "--scenario", scenario)
+    run = (*study, "--formulation", "my-formulation[gain=2]")
     how = ("--plant", "ideal", "--reference", "time", "--jobs", "1", "--out", "out")
     listed, ran = run_all(tmp_path, [("list",), (*run, *how)], path=site)
     assert "my-formulation" in (listed / "stdout").read_text()
@@ -349,7 +362,7 @@ def test_a_law_and_a_family_in_files_run_without_packaging(
     done = in_process(
         "run", "--formulation", law, "--formulation", f"{law}[gain=2]",
         "--scenario", "unpackaged_reach.py:Short[distance=0.02|0.1]",
-        "--plant", "ideal", "--reference", "time", "--out", "out",
+        "--plant", "ideal", "--reference", "time", "--jobs", "1", "--out", "out",
     )  # fmt: skip
     assert done.exit_code == 0, done.output
     trials = pd.read_csv(tmp_path / "out" / "trials.csv")
@@ -376,10 +389,16 @@ SHORT = (
 def test_time_and_status_work_on_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Times alone first, then the trials, then what is there."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(write, "write_report", lambda folder: "")
+    with without_workers():
+        _times_and_status(tmp_path)
+
+
+def _times_and_status(folder: Path) -> None:
     timed = in_process("time", *SHORT, "--out", "out")
     assert timed.exit_code == 0, timed.output
     assert "Timing of one call" in timed.stdout
-    assert list(pd.read_csv(tmp_path / "out" / "timing.csv")["formulation"]) == ["dls"]
+    assert list(pd.read_csv(folder / "out" / "timing.csv")["formulation"]) == ["dls"]
     missing = in_process("status", "out")
     assert missing.stdout.split() == ["1", "missing", "1", "planned"]
     assert in_process("run", *SHORT, "--out", "out", "--jobs", "1").exit_code == 0
@@ -389,7 +408,7 @@ def test_time_and_status_work_on_a_folder(tmp_path: Path, monkeypatch: pytest.Mo
     nothing = in_process("status", "nosuch")
     assert nothing.exit_code == 2
     assert nothing.stderr.startswith("error: no results in")
-    assert not (tmp_path / "nosuch").exists()
+    assert not (folder / "nosuch").exists()
 
 
 def test_ctrl_c_keeps_what_is_finished_and_says_how_to_go_on(tmp_path: Path) -> None:

@@ -25,7 +25,7 @@ from dikbench.solvers.catalogue.back_ends import parse_solver
 from dikbench.study.plan import expand
 from dikbench.study.study import Study, load_study
 
-EXAMPLES = int(os.environ.get("DIKBENCH_FUZZ", "2000"))
+EXAMPLES = int(os.environ.get("DIKBENCH_FUZZ", "1200"))
 
 VALID = """\
 description = "short"

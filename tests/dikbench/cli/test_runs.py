@@ -24,8 +24,9 @@ RUN = ("run", "--scenario", "reach[duration=0.1]", "--plant", "ideal", "--traces
 
 
 def run(out: Path, *options: str) -> tuple[int, str, str]:
-    """Exit code, stdout and stderr of a run."""
-    result = CliRunner().invoke(commands, [*RUN, "--jobs", "1", "--out", str(out), *options])
+    """Exit code, stdout and stderr of a run, whose trials run in this process."""
+    with without_workers():
+        result = CliRunner().invoke(commands, [*RUN, "--out", str(out), *options])
     return result.exit_code, result.stdout, result.stderr
 
 
@@ -100,7 +101,8 @@ def test_a_folder_holds_one_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     Path("other.toml").write_text(STUDY + '[timing]\nreference = "dls"\n')
 
     def ran(*study: str, **axes: str) -> int:
-        done = dikbench.run_study(*study, **axes, out="out", jobs=1, traces="none", report=False)  # type: ignore[arg-type]
+        with without_workers():
+            done = dikbench.run_study(*study, **axes, out="out", traces="none", report=False)  # type: ignore[arg-type]
         return len(done.trials)
 
     def refused(there: str, *arguments: str) -> None:

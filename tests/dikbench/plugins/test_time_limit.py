@@ -8,7 +8,7 @@ import threading
 import pytest
 
 from dikbench.errors import DikbenchError
-from dikbench.plugins.time_limit import time_limit
+from dikbench.plugins.time_limit import others_may_run, time_limit
 
 
 def endless() -> None:
@@ -45,3 +45,29 @@ def test_what_ends_in_time_is_left_alone() -> None:
     thread.start()
     thread.join()
     assert done
+
+
+def outer() -> None:
+    """Let others run for longer than is left, then take the rest."""
+    with time_limit(0.1, "the outer"):
+        with others_may_run():
+            inner()
+        endless()
+
+
+def inner() -> None:
+    """Run into a limit of its own."""
+    with (
+        pytest.raises(DikbenchError, match=r"^the inner takes longer"),
+        time_limit(0.3, "the inner"),
+    ):
+        endless()
+
+
+def test_the_time_of_others_does_not_count() -> None:
+    """They may have a limit of their own; afterwards the first one counts on."""
+    with pytest.raises(DikbenchError, match=r"^the outer takes longer"):
+        outer()
+    assert signal.getsignal(signal.SIGVTALRM) == signal.SIG_DFL
+    with others_may_run():  # without a limit around it
+        assert signal.getitimer(signal.ITIMER_VIRTUAL) == (0.0, 0.0)

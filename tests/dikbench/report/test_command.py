@@ -11,6 +11,8 @@ from dikbench.cli import commands
 from dikbench.metrics import METRICS, OUTCOME_NUMBERS, OUTCOME_TEXTS
 from dikbench.report.write import write_report
 
+pytestmark = pytest.mark.usefixtures("drawn")  # without PNGs
+
 
 def test_a_report_is_remade_by_its_command(tmp_path: Path) -> None:
     """It prints the tables and where the page is; made twice it is the same."""

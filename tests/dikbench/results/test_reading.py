@@ -21,6 +21,12 @@ from dikbench.report.write import write_report
 from dikbench.results.reading import read_results
 
 
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A report has no figures meanwhile."""
+    monkeypatch.setattr("dikbench.report.write.draw_figures", lambda *given: [])
+
+
 def test_committed_results_read_like_the_store(stored: Path, committed: Path) -> None:
     """Every value is bit-equal, and so are the types, the manifest and the attributes."""
     for lenient in (False, True):
@@ -126,6 +132,7 @@ def test_loading_is_lazy() -> None:
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_report_is_remade_from_the_committed_files(stored: Path, tmp_path: Path) -> None:
     """Without a store, and without traces, the page has the same sentences and tables."""
     whole, bare = tmp_path / "whole", tmp_path / "bare"
@@ -172,6 +179,7 @@ def test_a_damaged_store_gives_way_to_the_exports(stored: Path, tmp_path: Path) 
     assert any("trials.csv" in note and "store" in note for note in found.notes)
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("cut", [1, 60])
 def test_a_truncated_table_gives_the_rows_that_are_whole(tmp_path: Path, cut: int) -> None:
     """The row that was cut is left out and counted, and the trials that are missing are said."""
@@ -241,6 +249,7 @@ def test_a_damaged_folder_is_an_error_to_all_but_the_report(
     assert len(read_results(folder, lenient=True).trials) == (2 if harm == "no manifest" else 1)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_report_without_a_manifest_is_made(tmp_path: Path) -> None:
     """It carries the tables, and what is not known among its limitations."""
     folder = write_results(tmp_path / "out", make_rows({"pinv": {}}))

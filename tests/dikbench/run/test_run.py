@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import pickle
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 import pytest
+from makers.runs import briefly_timed, without_workers
 from makers.shared import made_once
 
 from dikbench.metrics import METRICS
@@ -63,8 +64,8 @@ class Hostile:
         if self.how == "shape":
             return np.zeros(problem.robot.nv + 1)
         if self.how == "print":
-            print("x" * 10**7)
-            os.write(2, b"y" * 10**7)
+            print("x" * 10**6)
+            os.write(2, b"y" * 10**6)
         if self.how in ("fork", "forked copy") and not forked:
             forked.append(True)  # once: a copy that forks in every step would be a bomb
             if os.fork() == 0 and self.how == "fork":
@@ -164,13 +165,18 @@ def test_seeds_differ_and_a_path_indexed_run_waits(results: Path) -> None:
 
 def test_a_run_is_the_same_with_one_worker_and_with_two(tmp_path: Path) -> None:
     """Every column but the times is bit-equal whatever the number of workers."""
-    selection = Selection(scenarios=("near-miss[miss=0.02,dt=0.05]",), plants=("ideal",))
+    selection = Selection(
+        formulations=("oracle", "dls", "qp", "lp-alpha-cvxpy"),
+        scenarios=("near-miss[miss=0.02,dt=0.05]",),
+        plants=("ideal",),
+    )
     planned = expand(select(load_study("smoke"), selection, named=True))
     tables = []
     folders = [ResultsFolder(tmp_path / str(jobs)) for jobs in (1, 2)]
     for jobs, folder in enumerate(folders, start=1):
         folder.traces.mkdir(parents=True)
-        rows = {p.id: row for p, row in run_trials(planned, folder, RunSettings(jobs))}
+        found = run_trials(planned, folder, RunSettings(jobs))
+        rows = {p.id: row for some in found for p, row in some}
         tables.append(pd.DataFrame([rows[p.id] for p in planned]).drop(columns=UNEQUAL))
     pd.testing.assert_frame_equal(tables[0], tables[1], check_exact=True)
     one, two = folders
@@ -207,53 +213,81 @@ def write_hostile(folder: Path) -> str:
     return f"{path}:Hostile"
 
 
-def rows_of(
-    out: Path, formulations: Sequence[str], settings: RunSettings, scenario: str = "reach"
-) -> dict[str, dict[str, Any]]:
-    """The rows of a run on the ideal plant, by formulation."""
-    selection = Selection(
-        formulations=tuple(formulations), scenarios=(scenario,), plants=("ideal",)
-    )
+def pairs_of(name: str, hows: Sequence[str]) -> dict[str, tuple[str, str]]:
+    """For each thing to do the hostile formulation that does it, and a `dls` of its own."""
+    return {
+        how: (f"{name}[how={how}]", f"dls[damping={0.05 + 1e-4 * number:g}]")
+        for number, how in enumerate(hows)
+    }
+
+
+def selection_of(pairs: Mapping[str, tuple[str, str]], scenario: str = "reach") -> Selection:
+    """Both of each pair, one after the other, on the ideal plant."""
+    formulations = tuple(one for pair in pairs.values() for one in pair)
+    return Selection(formulations=formulations, scenarios=(scenario,), plants=("ideal",))
+
+
+def rows_of(out: Path, selection: Selection, settings: RunSettings) -> dict[str, dict[str, Any]]:
+    """The rows of a run, by formulation."""
     planned = expand(select(load_study("smoke"), selection, named=False))
     folder = ResultsFolder(out)
     folder.traces.mkdir(parents=True)
     found = run_trials(planned, folder, settings)
-    return {str(p.trial.formulation): row for p, row in found}
+    return {str(p.trial.formulation): row for some in found for p, row in some}
+
+
+ENDLESS = ("spin", "sleep")
+LIMIT_S = 8.0
+"""Of time, for those that never end: a slow machine must not reach it otherwise."""
+
+Pairs = dict[str, tuple[dict[str, Any], dict[str, Any]]]
+"""The row of each hostile formulation, and that of `dls`, which was run after it."""
 
 
 @pytest.fixture(scope="module")
-def pairs(
-    tmp_path_factory: pytest.TempPathFactory,
-) -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:
-    """The row of each hostile formulation, and that of `dls`, which was run after it.
+def hung(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The results of a run, with its report, in which laws never end."""
+    return made_once(tmp_path_factory, "hung", _run_hung)
 
-    In two runs: those that never end need a limit of time that a slow machine must not reach.
-    """
+
+def _run_hung(folder: Path) -> None:
+    pairs = pairs_of(write_hostile(folder), ENDLESS)
+    run_study(
+        briefly_timed(select(load_study("smoke"), selection_of(pairs), named=False)),
+        folder / "out",
+        RunSettings(jobs=2, trial_timeout=LIMIT_S),
+        "a test",
+    )
+    write_report(folder / "out")
+
+
+@pytest.fixture(scope="module")
+def pairs(tmp_path_factory: pytest.TempPathFactory, hung: Path) -> Pairs:
+    """Those of two runs: one with a short limit of time, and one without."""
+    rows = pd.read_csv(hung / "out" / "trials.csv")
+    rows = rows[rows["reference"] == "time"].set_index("formulation", drop=False)
+
+    def row(formulation: str) -> dict[str, Any]:
+        return {str(name): value for name, value in rows.loc[formulation].items()}
+
     folder = made_once(tmp_path_factory, "hostile", _run_hostile)
-    return pickle.loads((folder / "pairs").read_bytes())  # type: ignore[no-any-return]
+    found: Pairs = pickle.loads((folder / "pairs").read_bytes())
+    for how, (bad, good) in pairs_of(str(hung / "hostile.py:Hostile"), ENDLESS).items():
+        found[how] = row(bad), row(good)
+    return found
 
 
 def _run_hostile(folder: Path) -> None:
-    """Run each hostile formulation, and `dls` after it; keep the rows."""
-    name, endless = write_hostile(folder), ("spin", "sleep")
-    found: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {}
-    for how, limit in ((endless, 8.0), (tuple(set(ENDS) - set(endless)), 120.0)):
-        both = {
-            each: (f"{name}[how={each}]", f"dls[damping={0.05 + 1e-4 * number:g}]")
-            for number, each in enumerate(sorted(how))
-        }
-        settings = RunSettings(jobs=1, trial_timeout=limit, trial_memory=2000)
-        rows = rows_of(
-            folder / f"{limit:g}", [one for pair in both.values() for one in pair], settings
-        )
-        found |= {each: (rows[bad], rows[good]) for each, (bad, good) in both.items()}
+    """Run each other hostile formulation, and `dls` after it; keep the rows."""
+    pairs = pairs_of(write_hostile(folder), sorted(ENDS.keys() - set(ENDLESS)))
+    settings = RunSettings(jobs=1, trial_timeout=120.0, trial_memory=2000)
+    rows = rows_of(folder / "out", selection_of(pairs), settings)
+    found = {how: (rows[bad], rows[good]) for how, (bad, good) in pairs.items()}
     (folder / "pairs").write_bytes(pickle.dumps(found))
 
 
 @pytest.mark.parametrize("how", ENDS)
-def test_a_hostile_law_ends_as_a_row_and_the_run_goes_on(
-    pairs: dict[str, tuple[dict[str, Any], dict[str, Any]]], how: str
-) -> None:
+def test_a_hostile_law_ends_as_a_row_and_the_run_goes_on(pairs: Pairs, how: str) -> None:
     """Whatever a law does, its trial is a row with its status and the others are untouched."""
     bad, good = pairs[how]
     status, message = ENDS[how]
@@ -287,28 +321,23 @@ ODDITIES = ("print", "fork", "forked copy", "chdir", "numpy state")
 
 def test_a_harmless_oddity_of_a_law_changes_nothing(tmp_path: Path) -> None:
     """It ends as `ok`, and the row after it, in the same process, is that of a run without it."""
-    odd = {how: f"{write_hostile(tmp_path)}[how={how}]" for how in ODDITIES}
-    after = {how: f"dls[damping={0.05 + 1e-4 * n:g}]" for n, how in enumerate(ODDITIES)}
-    pairs = [one for how in ODDITIES for one in (odd[how], after[how])]
-    rows = rows_of(tmp_path / "out", pairs, PATIENT, SHORT)
-    alone = rows_of(tmp_path / "alone", [*after.values()], PATIENT, SHORT)
-    for how in ODDITIES:
-        assert rows[odd[how]]["status"] == "ok", how
+    pairs = pairs_of(write_hostile(tmp_path), ODDITIES)
+    rows = rows_of(tmp_path / "out", selection_of(pairs, SHORT), PATIENT)
+    after = [good for _, good in pairs.values()]
+    selection = Selection(formulations=tuple(after), scenarios=(SHORT,), plants=("ideal",))
+    with without_workers():
+        alone = rows_of(tmp_path / "alone", selection, PATIENT)
+    for how, (odd, _) in pairs.items():
+        assert rows[odd]["status"] == "ok", how
     one, other = (
-        pd.DataFrame([found[name] for name in after.values()]).drop(columns=UNEQUAL)
+        pd.DataFrame([found[name] for name in after]).drop(columns=UNEQUAL)
         for found in (rows, alone)
     )
     pd.testing.assert_frame_equal(one, other, check_exact=True)
 
 
-def test_a_law_that_hangs_is_not_timed_and_the_others_are(tmp_path: Path) -> None:
+def test_a_law_that_hangs_is_not_timed_and_the_others_are(hung: Path) -> None:
     """The run ends with its report: the timing pass has no limit for a single call."""
-    formulation = write_hostile(tmp_path)
-    selection = Selection(
-        formulations=(f"{formulation}[how=sleep]", "dls"), scenarios=("reach[duration=0.2]",)
-    )
-    study = select(load_study("smoke"), selection, named=False)
-    run_study(study, tmp_path / "out", RunSettings(jobs=2, trial_timeout=10.0), "a test")
-    write_report(tmp_path / "out")
-    assert set(pd.read_csv(tmp_path / "out" / "timing.csv")["formulation"]) == {"dls"}
-    assert "2 trials timeout: not finished after 10 s" in (tmp_path / "out/report.md").read_text()
+    timed = set(pd.read_csv(hung / "out" / "timing.csv")["formulation"])
+    assert timed == {good for _, good in pairs_of("", ENDLESS).values()}
+    assert f"not finished after {LIMIT_S:g} s" in (hung / "out" / "report.md").read_text()

@@ -114,6 +114,25 @@ def test_success_must_not_fall(folder: Callable[..., Path]) -> None:
     assert dikbench(a, b).exit_code == 0
 
 
+def test_what_got_worst_is_told_first(folder: Callable[..., Path]) -> None:
+    """The larger fall and the larger ratio, though its formulation comes later in the rows."""
+
+    def slow(table: pd.DataFrame) -> None:
+        factor = table["formulation"].map({"dls": 2.0, "qp": 3.0}).fillna(1.0)
+        table["formulation_time_median_us"] *= factor
+
+    def change(table: pd.DataFrame) -> pd.DataFrame:
+        dls, qp = (table.index[table["formulation"].eq(name)] for name in ("dls", "qp"))
+        assert dls[0] < qp[0]
+        slow(table := fails(dls[0], *qp[:2])(table))
+        return table
+
+    a, b = folder("a", fails()), folder("b", change)
+    line = first_line(dikbench(a, b, "--tolerance", "formulation_time_median_us=20%", *ANY))
+    assert line.index("success of qp") < line.index("success of dls")
+    assert line.index("qp with daqp takes 3 times") < line.index("dls takes 2 times")
+
+
 def test_success_that_one_folder_does_not_know(folder: Callable[..., Path]) -> None:
     """Older results have no outcomes: other gates hold, and one on success is refused."""
     a, b = folder("a", lambda table: table.drop(columns="outcome")), folder("b", fails(2))

@@ -11,6 +11,7 @@ from dikbench.plugins.finding import plugins
 from dikbench.report.contents.contents import gather
 from dikbench.report.contents.docstring import parse_docstring
 from dikbench.report.contents.formulations_and_families import families_of, formulations_of
+from dikbench.report.pages.markdown_page import render_markdown
 from dikbench.results.reading import read_results, without_attributes
 from dikbench.scenario.situation import Situation
 
@@ -146,4 +147,36 @@ def test_skipped_cells_are_no_trials_of_the_heading(tmp_path: Path) -> None:
     )
     folder = write_results(tmp_path / "out", rows)
     contents = gather(without_attributes(read_results(folder, lenient=True)), ())
-    assert contents.counts[:3] == [(3, "trials run"), (1, "failed"), (1, "cell skipped")]
+    assert contents.counts[:3] == [
+        (3, "of 4 planned trials run"), (1, "failed"), (1, "cell skipped"),
+    ]  # fmt: skip
+
+
+def test_the_heading_says_what_ran_and_what_was_planned_where_they_differ(tmp_path: Path) -> None:
+    """Of trials, formulations, scenarios and seeds; a study that ran is described as it is."""
+    rows = make_rows(
+        {"pinv": {}, "dls": {"status": "skipped", "outcome": ""}}, ("reach", "step"), (0, 1)
+    )
+    study = {"name": "a", "description": "Two of four", "seeds": [0, 1, 2]}
+    study["scenarios"] = ["reach", "step", "hold-still"]
+    folder = write_results(tmp_path / "part", rows, study=study, trials=18)
+    contents = gather(without_attributes(read_results(folder, lenient=True)), ())
+    assert contents.counts == [
+        (4, "of 18 planned trials run"),
+        (0, "failed"),
+        (4, "cells skipped"),
+        (10, "missing"),
+        (1, "of 2 planned formulations with their solvers"),
+        (2, "of 3 planned scenarios"),
+        (2, "of 3 planned seeds"),
+    ]
+    assert contents.description == "As it was planned: Two of four."
+    page = render_markdown(contents)
+    assert "As it was planned: Two of four.\n\n4 of 18 planned trials run, 0 failed, " in page
+    whole = write_results(tmp_path / "whole", make_rows({"pinv": {}}, ("reach", "step")))
+    contents = gather(without_attributes(read_results(whole, lenient=True)), ())
+    assert contents.description == "Rows that nobody ran."
+    assert contents.counts == [
+        (2, "trials run"), (0, "failed"), (1, "formulation with its solver"), (2, "scenarios"),
+        (1, "seed"),
+    ]  # fmt: skip

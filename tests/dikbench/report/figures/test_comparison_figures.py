@@ -113,6 +113,8 @@ def test_points_of_success_and_slow_down(drawn: list[Any], target: Path) -> None
     points = success_points(trials)
     assert points["success"].tolist() == pytest.approx([200 / 3, 200 / 3])
     assert points["slow_down"].tolist() == pytest.approx([4.0, 1.0])
+    assert points["slow_down_cases"].tolist() == [2, 2]
+    assert not points["slow_down_same"].any()
     assert points["stopped"].tolist() == [False, True]
     times = trials.groupby("formulation", sort=False)["formulation_time_p99_us"].median() / 1e3
     assert points["time"].tolist() == pytest.approx(times.tolist())
@@ -124,6 +126,53 @@ def test_points_of_success_and_slow_down(drawn: list[Any], target: Path) -> None
         assert kept.get_offsets()[0].tolist() == pytest.approx(points[[across, "success"]].iloc[0])
         assert (stopped.get_facecolors()[0] == 1.0).all()
         assert {text.get_text() for text in figure.axes[0].texts} >= {"steady", "hasty"}
+
+
+@pytest.mark.parametrize("common", [4, 5])
+def test_durations_are_of_the_same_cases_or_said_not_to_be(
+    drawn: list[Any], target: Path, common: int
+) -> None:
+    """Of the five scenarios that both did; with four each over its own, which the caption counts.
+
+    Who never succeeds takes nothing from the others, and has no place.
+    """
+    scenarios = [f"reach[distance=0.{k + 1}]" for k in range(8)]
+    trials = random_rows(["steady", "picky", "lost"], scenarios).assign(reference="path")
+    trials = outcomes(
+        trials,
+        picky=["success"] * common + ["left-path"] * (8 - common),
+        lost=["left-path"] * 8,
+    )
+    trials["slow_down"] = [2.0] * common + [4.0] * (8 - common) + [1.5] * 8 + [9.0] * 8
+    points = success_points(trials)
+    assert points["slow_down"].isna().tolist() == [False, False, True]
+    own = (2.0**common * 4.0 ** (8 - common)) ** (1 / 8)
+    expected = 2.0 if common == 5 else own
+    assert points["slow_down"].tolist()[:2] == pytest.approx([expected, 1.5])
+    with style():
+        (figure,) = draw_success_against_slow_down(trials, target)
+    label = drawn[0].axes[0].get_xlabel()
+    if common == 5:
+        assert "nominal one, over the 5 cases that all of them did. Best" in figure.caption
+        assert label.endswith("over the 5 cases that all of them did")
+    else:
+        assert "each over the cases that it did itself (4 to 8: " in figure.caption
+        assert label.endswith("each over the cases that it did itself")
+
+
+def test_times_are_of_the_same_scenarios_or_said_not_to_be(target: Path) -> None:
+    """Six were timed for both, and one more for one of them, which does not count."""
+    scenarios = [f"reach[distance=0.{k + 1}]" for k in range(7)]
+    trials = random_rows(["a", "b"], scenarios).assign(reference="path")
+    trials["formulation_time_p99_us"] = [1e3] * 3 + [3e3] * 3 + [9e3] + [5e3] * 6 + [np.nan]
+    assert success_points(trials)["time"].tolist() == pytest.approx([2.0, 5.0])
+    with style():
+        (figure,) = draw_success_against_time(trials, target)
+        assert "over the 6 scenarios that all of them were timed on" in figure.caption
+        trials.loc[8:, "formulation_time_p99_us"] = np.nan
+        (figure,) = draw_success_against_time(trials, target)
+        assert "that it were timed on" not in figure.caption
+        assert "(1 to 7: " in figure.caption
 
 
 def test_bars_are_the_parts_of_a_step(drawn: list[Any], target: Path) -> None:

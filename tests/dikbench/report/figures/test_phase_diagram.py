@@ -12,7 +12,11 @@ from matplotlib.collections import QuadMesh
 
 from dikbench.arrays import Array
 from dikbench.report.drawing.style import style
-from dikbench.report.figures.phase_diagram import draw_phase_diagrams, three_digits
+from dikbench.report.figures.phase_diagram import (
+    against_limit,
+    draw_phase_diagrams,
+    three_digits,
+)
 from dikbench.report.selection.categories import CATEGORIES
 from dikbench.report.selection.phase_grids import phase_grids
 
@@ -53,6 +57,27 @@ def test_cells_hold_what_the_table_says(drawn: list[Any], target: Path) -> None:
             assert [text.get_text() for text in axis.texts] == [
                 three_digits(value) for value in wanted.ravel()
             ]
+
+
+def test_a_label_at_the_limit_agrees_with_the_outcome(drawn: list[Any], target: Path) -> None:
+    """1.0005 keeps the limit and is 1, on blue; 1.0012 breaks it, is >1, and is not on blue."""
+    trials = random_rows(["dls"], GRID, seeds=(0, 1))
+    peaks = [0.5, 1.0, 1.0005, 1.001, 1.0012, 1.2]
+    trials["velocity_peak_ratio"] = np.repeat(peaks, 2) * np.tile([0.9, 1.0], 6)
+    trials["outcome"] = np.where(trials["velocity_peak_ratio"].le(1.001), "success", "limit-broken")
+    with style():
+        draw_phase_diagrams(trials, target)
+    speed, outcome = drawn[1].axes[0], drawn[2].axes[0]
+    kept = cells(outcome) == 0
+    mesh = next(artist for artist in speed.collections if isinstance(artist, QuadMesh))
+    blue = mesh.cmap.get_under()
+    is_blue = (np.abs(mesh.to_rgba(cells(speed)) - blue) < 1e-6).all(axis=-1)
+    assert np.array_equal(is_blue, kept)
+    assert kept.sum() == 4
+    labels = np.array([text.get_text() for text in speed.texts]).reshape(kept.shape)
+    for label, keeps in zip(labels.ravel(), kept.ravel(), strict=True):
+        assert (label in (".5", "1")) == keeps
+        assert (label in (">1", "1.2")) != keeps
 
 
 def test_a_failed_trial_is_black_and_a_missing_one_blank(drawn: list[Any], target: Path) -> None:
@@ -121,6 +146,15 @@ def test_many_laws_make_several_pages(drawn: list[Any], target: Path) -> None:
     titles = [[axis.get_title() for axis in shown.axes if axis.get_title()] for shown in errors]
     assert [len(page) for page in titles] == [11, 10]
     assert {title for page in titles for title in page} == set(names)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.0, "0"), (0.96, "1"), (1.001, "1"), (1.0010001, ">1"), (1.04, ">1"), (1.06, "1.1")],
+)
+def test_a_peak_speed_says_on_which_side_of_its_limit_it_is(value: float, text: str) -> None:
+    """As outcomes count it: up to 1.001."""
+    assert against_limit(value) == text
 
 
 @pytest.mark.parametrize(

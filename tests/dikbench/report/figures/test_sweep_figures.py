@@ -111,6 +111,28 @@ def test_a_law_sweep_takes_success_the_median_error_and_the_worst_speed(
         np.testing.assert_allclose(curve.get_xdata(), [0.0, 1.0, 2.0])
 
 
+def test_what_nothing_can_do_has_no_curve_of_success(drawn: list[Any], target: Path) -> None:
+    """Of a family of which one scenario can be done that one alone counts; the caption says it."""
+    formulations = [f"dls[damping={damping}]" for damping in ("0.01", "0.1", "1")]
+    trials = random_rows(formulations, ["reach", "reach[gain=2]", "step", "far"])
+    trials.loc[trials["scenario"].eq("far"), "feasible"] = "no"
+    trials.loc[trials["scenario"].eq("reach[gain=2]"), "feasible"] = "unknown"
+    trials.loc[~trials["feasible"].eq("time"), "outcome"] = "left-path"
+    with style():
+        (figure,) = draw_formulation_sweeps(trials, target)
+    success, error, _ = drawn[0].axes
+    curves = {line.get_label(): line.get_ydata() for line in success.lines}
+    assert np.isnan(curves["far"]).all()
+    assert list(curves["reach"]) == list(curves["step"]) == [100.0] * 3
+    assert any(line.get_label() == "far" and np.isfinite(line.get_ydata()).all()
+               for line in error.lines)  # fmt: skip
+    assert "Without a curve of success: far, which no known motion can do." in figure.caption
+    trials["feasible"] = "path"
+    with style():
+        (figure,) = draw_formulation_sweeps(trials, target)
+    assert "Without" not in figure.caption
+
+
 @pytest.mark.parametrize("count", [1, pytest.param(13, marks=pytest.mark.long), 25])
 def test_any_number_of_laws_is_drawn(target: Path, count: int) -> None:
     """One formulation, a dozen and one more than a page holds, each page below 200 kB."""

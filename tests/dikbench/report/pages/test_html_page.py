@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from html.parser import HTMLParser
 from itertools import pairwise
 from pathlib import Path
@@ -246,5 +246,7 @@ def test_cells_are_sorted_by_their_number() -> None:
     column = Column("a", "a", "a")
     assert _td(TableCell(float("nan")), column) == "<td></td>"
     assert _td(TableCell(0.12345), column) == "<td>0.123</td>"
+    assert _td(TableCell(1.0012), column) == "<td>1</td>"
+    assert _td(TableCell(1.0012), replace(column, most=1.001)) == "<td>1.0012</td>"
     assert 'data-sort="2"' in _td(TableCell(2.0, 1.0, 3.0), column)
     assert 'data-sort="Infinity"' in _td(TableCell(float("inf")), column)

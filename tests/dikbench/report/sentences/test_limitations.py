@@ -25,7 +25,7 @@ def test_each_limitation_is_said_where_it_applies_and_only_there() -> None:
             "status": ["timeout", "ok"], "message": "not finished after 4 s",
         },
         "2 cells could not run": {"status": "skipped", "message": "it cannot"},
-        "2 cells skipped: it cannot (`a`; on `reach` and `near-miss`).": {
+        "2 cells skipped: it cannot (`a`; on `near-miss` and `reach`).": {
             "status": "skipped",
             "message": "it cannot",
         },
@@ -94,6 +94,30 @@ def test_trials_that_are_missing_are_counted() -> None:
     assert missing(rows, manifest) == 3
     assert "3 of 7 trials are missing" in told(rows, manifest)
     assert "2 rows of earlier runs" in told(rows, manifest)
+
+
+def test_lists_begin_with_what_matters_most_whatever_the_order_of_the_rows() -> None:
+    """Reasons by how often they occur, shares by their size, names in order of the alphabet."""
+    timed = {"formulation_time_median_us": 1.0, "timing_stability": "drift"}
+    rows = make_rows(
+        {
+            "c": {"status": "skipped", "message": "often", **timed},
+            "b": {"status": ["ok", "skipped"], "message": ["", "rarely"], "relaxed_share": 0.2},
+            "a": {"status": "skipped", "message": "often", "relaxed_share": 0.1, **timed},
+            "d": {"relaxed_share": 0.9},
+        },
+        ("reach", "near-miss"),
+    )
+    for order in (rows, rows.iloc[::-1]):
+        found = {each.text[:4].strip(): each.cases for each in limitations(order, STUDY, [])}
+        assert found["5 ce"] == (
+            "4 cells skipped: often (`a` and `c`; on `near-miss` and `reach`).",
+            "1 cell skipped: rarely (`b`; on `near-miss`).",
+        )
+        assert [case[:3] for case in found["Acce"]] == ["`d`", "`b`", "`a`"]
+        assert [case.split(":")[0] for case in found["Of 4"]] == [
+            f"`{name}` on `{scenario}`" for name in "ac" for scenario in ("near-miss", "reach")
+        ]
 
 
 @pytest.mark.parametrize("seed", [5, 0])

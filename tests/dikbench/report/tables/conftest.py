@@ -7,6 +7,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from makers.made_up import made_up_study
+from makers.shared import made_once
 
 from dikbench.report.tables.build import make_table
 from dikbench.report.tables.files import write_table
@@ -26,12 +27,14 @@ def made_up_trials() -> pd.DataFrame:
 @pytest.fixture(scope="session")
 def made_up(tmp_path_factory: pytest.TempPathFactory, made_up_trials: pd.DataFrame) -> Path:
     """The folder: trials.csv and tables/."""
-    folder = tmp_path_factory.mktemp("made_up")
-    made_up_study().to_csv(folder / "trials.csv", index=False)
-    every = [table(made_up_trials) for table in (success_table, outcome_table, solver_axis)]
-    for table in (*every, *(make_table(kind, made_up_trials) for kind in KINDS)):
-        write_table(table, folder / "tables")
-    return folder
+
+    def write(folder: Path) -> None:
+        made_up_study().to_csv(folder / "trials.csv", index=False)
+        every = [table(made_up_trials) for table in (success_table, outcome_table, solver_axis)]
+        for table in (*every, *(make_table(kind, made_up_trials) for kind in KINDS)):
+            write_table(table, folder / "tables")
+
+    return made_once(tmp_path_factory, "made_up", write)
 
 
 @pytest.fixture(params=["a real run", "made-up trials"])

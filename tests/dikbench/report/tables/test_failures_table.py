@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from makers.rows import make_rows
+from makers.rows import Values, make_rows
 
 from dikbench.metrics import Judgement, Outcome
 from dikbench.report.tables.failures import (
@@ -50,6 +50,9 @@ def test_a_failure_is_told_with_step_figure_and_limit_in_units_for_people() -> N
     assert case == {
         "formulation": "a",
         "scenario": "reach",
+        "reference": "time",
+        "seed": 0,
+        "plant": "ideal",
         "outcome": "limit-broken",
         "at step": "12 of 100",
         "what": "joint speed over its limit",
@@ -89,6 +92,36 @@ def test_the_worst_comes_first() -> None:
     assert [case["formulation"] for case in found] == order
     assert found[0]["at most"] == "1 mm"
     assert found[-1]["figure"] == "none does"
+
+
+def test_the_trial_that_is_shown_is_the_one_of_the_row() -> None:
+    """Reference, seed and plant of the worst of several, by which it can be run again."""
+    rows = pd.concat(
+        [
+            make_rows({"a": LEFT}, seeds=(0, 3), plant=plant, reference=reference)
+            for plant in ("ideal", "saturating") for reference in ("time", "path")
+        ]
+    ).reset_index(drop=True)  # fmt: skip
+    worst = rows["plant"].eq("ideal") & rows["reference"].eq("path") & rows["seed"].eq(3)
+    rows.loc[worst, "outcome_figure"] = 0.5
+    (case,) = told(rows)
+    assert [case[name] for name in ("reference", "seed", "plant")] == ["path", 3, "ideal"]
+    assert case["figure"] == "500 mm"
+    assert case["trials"] == 4
+
+
+@pytest.mark.parametrize("laws", [3, CASES + 5])
+def test_no_formulation_is_crowded_out_by_those_that_fail_worse(laws: int) -> None:
+    """Each with its worst case at least; formulations take turns, and solvers are one of it."""
+    scenarios = [f"reach[distance=0.{number + 1}]" for number in range(6)]
+    law: dict[str | tuple[str, str], Values] = {f"reckless{k}": SPEED for k in range(laws)}
+    law |= {("qp", f"solver{k}"): SPEED for k in range(30)}
+    rows = make_rows({**law, "careful": LEFT}, scenarios)
+    shown = [str(case["formulation"]).split(",")[0] for case in told(rows)]
+    assert shown.count("careful") == (3 if laws == 3 else 1)
+    assert shown[-1] == "careful"
+    assert set(shown) == {"qp", "careful", *(f"reckless{k}" for k in range(laws))}
+    assert len(shown) == max(CASES, laws + 2)
 
 
 def test_a_joint_outside_is_told_as_an_angle_and_as_a_length() -> None:
@@ -176,6 +209,9 @@ def test_a_readable_number_is_shown_and_the_rest_is_counted(counts: list[int], s
     found = failures(rows)
     shown = min(CASES, sum(min(CASES_OF_EACH, count) for count in counts))
     assert len(found.cases) == shown
+    assert set(found.cases.get("formulation", [])) == {
+        f"law{k}" for k, count in enumerate(counts) if count
+    }
     if not sum(counts):
         assert found.note == f"None of {len(rows)} trials that count failed."
         return

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from pathlib import Path
 from statistics import median
 
@@ -159,7 +160,32 @@ def test_notes_say_what_is_left_out_and_definitions_what_is_in(
     assert "at most 5 % of all trials" in said
     assert "50 % of what the best" in said
     [free] = [column for column in table.columns if column.heading == "free space"]
-    assert free.definition.startswith("10 cases of 5 scenarios, 2 families and 3 robots where")
+    words = "5 scenarios of 3 robots, iiwa 2, ur5 2 and panda 1"
+    assert free.definition.startswith(f"10 cases ({words}) of 2 families where the path may wait")
+
+
+@pytest.mark.parametrize("setting", ["path", "time"])
+def test_the_sample_of_every_column_stands_beside_the_table(folder: Path, setting: str) -> None:
+    """Of each situation: scenarios, robots, scenarios of each, and who has most of the cases."""
+    trials = recomputed.read(folder / "trials.csv")
+    rows = recomputed.that_count(trials, setting)
+    page = (folder / "tables" / "success.md").read_text(encoding="utf-8")
+    where = {"path": "the path may wait", "time": "the clock does not wait"}[setting]
+    _, heading, block = page.partition(f"\n{where} (")
+    assert bool(heading) == bool(rows)
+    if not rows:
+        return
+    note = next(line for line in block.splitlines() if "Samples: " in line).split("Samples: ")[1]
+    for situation in {row["situation"] for row in rows}:
+        cases = {recomputed.case(r): r["robot"] for r in rows if r["situation"] == situation}
+        robots = Counter({scenario: robot for (scenario, _), robot in cases.items()}.values())
+        said = note.split(f"{situation}: ")[1].split(". ")[0].removesuffix(".")
+        assert said.startswith(f"{sum(robots.values())} scenario")
+        for robot, number_of in robots.items():
+            assert f"{robot} {number_of}" in said or said.endswith(f"one robot, {robot}")
+        robot, most = Counter(cases.values()).most_common(1)[0]
+        lead = most > len(cases) / 2 and len(robots) > 1
+        assert (f"; {robot} has {most} of the cases" in said) == lead
 
 
 def test_the_console_shows_every_column_of_seven_situations() -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Final
+from collections.abc import Iterable, Iterator
+from itertools import product
+from typing import Any, Final
 
 import numpy as np
 import pytest
@@ -164,9 +165,15 @@ class _Cold:
 # --- the same answers as the cold interface's
 
 
-@pytest.mark.parametrize("structure", STRUCTURES)
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("seed", range(2))
+def _in_turns(names: Iterable[str], structures: Iterable[str]) -> Iterator[Any]:
+    """Every solver and structure with two seeds, of which the normal run has one, in turns."""
+    for place, (name, structure) in enumerate(product(names, structures)):
+        for seed in range(2):
+            marks = () if seed == place % 2 else pytest.mark.long
+            yield pytest.param(name, structure, seed, marks=marks)
+
+
+@pytest.mark.parametrize(("name", "structure", "seed"), [*_in_turns(NAMES, STRUCTURES)])
 def test_a_drifting_quadratic_program_is_solved_at_every_step(
     name: str, structure: str, seed: int
 ) -> None:
@@ -177,9 +184,7 @@ def test_a_drifting_quadratic_program_is_solved_at_every_step(
         reference.compare(program, warm(program, 0))
 
 
-@pytest.mark.parametrize("structure", IN_BOUNDS)
-@pytest.mark.parametrize("name", LINEAR)
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize(("name", "structure", "seed"), [*_in_turns(LINEAR, IN_BOUNDS)])
 def test_a_drifting_linear_program_is_solved_at_every_step(
     name: str, structure: str, seed: int
 ) -> None:

@@ -1,0 +1,111 @@
+"""The blocks of trials that a worker runs at a time, and the engine of a study."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+from typing import Final, Literal
+
+from dikbench.errors import DikbenchError
+from dikbench.results.store import Store
+from dikbench.selector import Selector
+from dikbench.study.plan import PlannedTrial
+
+Engine = Literal["alone", "lockstep"]
+"""Whether each trial runs alone, or those of one kind in lockstep."""
+
+EngineChoice = Literal["auto", "alone", "lockstep"]
+
+LEAST_ROWS: Final = 8
+"""Lockstep pays from so many trials of one formulation, family, plant and clock on."""
+
+MOST_SCENARIOS: Final = 128
+"""Largest number of scenarios of a block ..."""
+
+MOST_TRIALS: Final = 1024
+"""... and of its trials: what is lost where a run is killed."""
+
+BLOCKS_PER_WORKER: Final = 4
+"""Fewest blocks for each worker, so that all end at about the same time."""
+
+SECONDS_PER_TRIAL: Final = 1.0
+"""Wall-clock time of a block beyond the limit of one trial, for each of its trials."""
+
+
+def engine_of(planned: Sequence[PlannedTrial], choice: EngineChoice, store: Store) -> Engine:
+    """Choose the engine of a study; that of the rows which it already has stays.
+
+    Args:
+        planned: its trials.
+        choice: the engine, or `auto`: lockstep where `LEAST_ROWS` trials on average share
+            formulation, solver, family, plant and clock.
+        store: of the results.
+
+    Raises:
+        DikbenchError: if the rows are of another engine than the one that is chosen.
+    """
+    try:
+        there = store.manifest().get("engine", "alone") if store.statuses() else None
+    except DikbenchError:  # nothing was run
+        there = None
+    if there is not None:
+        if choice not in ("auto", there):
+            raise DikbenchError(
+                f"store {store.path}: its trials ran with engine={there}; valid: that, or another "
+                "folder with --out"
+            )
+        return "lockstep" if there == "lockstep" else "alone"
+    if choice != "auto":
+        return choice
+    kinds = Counter(
+        (trial.formulation, trial.solver, trial.scenario.name, trial.plant, trial.reference)
+        for trial in (p.trial for p in planned if not p.skip)
+    )
+    return "lockstep" if kinds and kinds.total() / len(kinds) >= LEAST_ROWS else "alone"
+
+
+def blocks_of(ordered: Sequence[PlannedTrial], jobs: int) -> list[list[PlannedTrial]]:
+    """Divide trials, those of a scenario together, into blocks for a number of workers.
+
+    Scenarios of one family and robot are next to each other, since they can be built and run
+    together.
+    """
+    scenarios = [
+        list(group) for _, group in groupby(ordered, key=lambda p: (p.trial.scenario, p.trial.seed))
+    ]
+    scenarios.sort(key=lambda trials: _like(trials[0].trial.scenario))
+    most = max(1, min(MOST_SCENARIOS, len(scenarios) // (BLOCKS_PER_WORKER * jobs)))
+    blocks: list[list[PlannedTrial]] = []
+    held = 0
+    for trials in scenarios:
+        if not blocks or held == most or len(blocks[-1]) + len(trials) > MOST_TRIALS:
+            blocks.append([])
+            held = 0
+        blocks[-1] += trials
+        held += 1
+    return blocks
+
+
+def _like(scenario: Selector) -> tuple[str, str]:
+    return scenario.name, str(dict(scenario.parameters).get("robot", ""))
+
+
+def block_timeout(block: Sequence[PlannedTrial], trial_timeout: float) -> float:
+    """Return the wall-clock limit of a block [s] by that of a trial [s]."""
+    return trial_timeout + SECONDS_PER_TRIAL * len(block)
+
+
+def smaller(block: Sequence[PlannedTrial]) -> Iterator[list[PlannedTrial]]:
+    """Divide a block that ended its worker: by formulation, and then into its trials.
+
+    A formulation that hangs or ends its process thus costs its own rows only.
+    """
+    by_formulation: dict[object, list[PlannedTrial]] = {}
+    for p in block:
+        key = p.trial.formulation, p.trial.solver
+        by_formulation.setdefault(key, []).append(p)
+    if len(by_formulation) > 1:
+        yield from by_formulation.values()
+    else:
+        yield from ([p] for p in block)
