@@ -26,7 +26,7 @@ MOST_SCENARIOS: Final = 128
 MOST_TRIALS: Final = 1024
 """... and of its trials: what is lost where a run is killed."""
 
-BLOCKS_PER_WORKER: Final = 4
+BLOCKS_PER_WORKER: Final = 2
 """Fewest blocks for each worker, so that all end at about the same time."""
 
 SECONDS_PER_TRIAL: Final = 1.0

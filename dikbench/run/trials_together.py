@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Final
 
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building_together import make_scenarios
-from dikbench.problem.problem import is_batched, program_of
+from dikbench.problem.problem import Formulation, is_batched
 from dikbench.run.trial_row import (
-    CannotStore,
     Prepared,
     TracePolicy,
     TrialRow,
@@ -25,13 +24,18 @@ from dikbench.run.trial_row import (
 from dikbench.run.worker_process import restore_process
 from dikbench.scenario.oracle import ORACLES
 from dikbench.scenario.scenario import Scenario
-from dikbench.selector import parse_selector
-from dikbench.simulation.lockstep import kind_of, simulate_together
+from dikbench.selector import Selector, parse_selector
+from dikbench.simulation.lockstep import (
+    LockstepRun,
+    LockstepTrial,
+    kind_of,
+    simulate_together,
+)
 from dikbench.simulation.status import Status
 from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER
 from dikbench.study.trial import Trial
 
-MOST_ROWS: Final = 256
+MOST_ROWS: Final = 1024
 """So many trials are in lockstep at most: more are hardly faster, and need their memory."""
 
 
@@ -69,17 +73,24 @@ def work_together(
             alone.append((number, found))
         else:
             groups.setdefault(kind, []).append((number, found))
+    together: list[tuple[int, Prepared, LockstepRun]] = []
     for group in groups.values():
         for start in range(0, len(group), MOST_ROWS):
             part = group[start : start + MOST_ROWS]
             try:
-                made = _in_lockstep(part, traces, policy)
-            except CannotStore:
-                raise
+                found_runs = _in_lockstep([ready for _, ready in part])
             except Exception:  # each trial then says what is wrong of it
                 alone += part
                 continue
-            rows.update(zip((number for number, _ in part), made, strict=True))
+            together += [(*each, run) for each, run in zip(part, found_runs, strict=True)]
+    made = rows_of(  # those of one scenario are measured together
+        [ready for _, ready, _ in together],
+        [each.run for _, _, each in together],
+        [traces[number] for number, _, _ in together],
+        policy,
+    )
+    for (number, _, each), row in zip(together, made, strict=True):
+        rows[number] = {**row, "asked_alone_steps": each.asked_alone}
     for number, ready in alone:
         run = partial(run_prepared, ready, traces[number], policy)
         rows[number] = attempted(ready.trial, run)
@@ -110,31 +121,26 @@ def _kind(ready: Prepared) -> object | None:
     kind = kind_of(ready.scenario)
     if kind is None:
         return None
-    return kind, trial.formulation, trial.solver, trial.plant, trial.reference
+    return kind, trial.plant, trial.reference
 
 
-def _in_lockstep(
-    group: Sequence[tuple[int, Prepared]], traces: Sequence[Path], policy: TracePolicy
-) -> list[TrialRow]:
-    """Run trials of one kind, and make their rows."""
-    ready = [each for _, each in group]
+def _in_lockstep(ready: Sequence[Prepared]) -> list[LockstepRun]:
+    """Run trials of one kind."""
     first = ready[0]
-    program = program_of(first.formulation)
-    # Where solvers are compared, each is asked for every row.
-    default = program is not None and first.trial.solver == parse_selector(DEFAULT_SOLVER[program])
+    trials: list[LockstepTrial] = []
+    known: dict[tuple[Selector, Selector], Formulation] = {}
+    for each in ready:
+        trial = each.trial
+        formulation = known.setdefault((trial.formulation, trial.solver), each.formulation)
+        guesses = _guesses(trial.solver)
+        trials.append(LockstepTrial(each.scenario, formulation, each.solve(), trial.seed, guesses))
     restore_process()
-    found = simulate_together(
-        [each.scenario for each in ready],
-        first.formulation,
-        [each.solve() for each in ready],
-        first.plant,
-        first.mode,
-        [each.trial.seed for each in ready],
-        guesses=default,
-    )
-    paths = [traces[number] for number, _ in group]
-    rows = rows_of(ready, [each.run for each in found], paths, policy)
-    for row, each in zip(rows, found, strict=True):
-        row["asked_alone_steps"] = each.asked_alone
+    found = simulate_together(trials, first.plant, first.mode)
     restore_process()
-    return rows
+    return found
+
+
+@lru_cache(maxsize=256)
+def _guesses(solver: Selector) -> bool:
+    """Say whether minimisers may be guessed: where solvers are compared, each is asked always."""
+    return any(solver == parse_selector(default) for default in DEFAULT_SOLVER.values())

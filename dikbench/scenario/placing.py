@@ -15,9 +15,9 @@ import pinocchio as pin
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.problem.tasks import OrientationTask, PoseTask, PositionTask, TrackingTask
+from dikbench.problem.tasks.pose import goes_along_screw
 from dikbench.robots.kinematics import Kinematics, moved
 from dikbench.robots.robot import Robot
-from dikbench.robots.task_rows import ALL_ROWS, PLANE_ROWS
 
 THERE: Final = 1e-12
 """A residual (m, rad) below this is none ..."""
@@ -150,7 +150,7 @@ def _sight(pursuit: Pursuit, kinematics: Kinematics) -> Sight:
     robot, tracking, log6 = pursuit.robot, pursuit.tracking, pin.log6
     rows, frame, placement = np.array(robot.task_rows), robot.frame_id, kinematics.placement
     ours = type(tracking) is PoseTask and tracking.frame in (None, robot.frame)
-    if not ours or robot.task_axes != "body" or robot.task_rows not in (ALL_ROWS, PLANE_ROWS):
+    if not ours or not goes_along_screw(robot):
         return _task_sight(tracking, kinematics)
     if len(rows) == 6:
         return (

@@ -167,6 +167,18 @@ class Scenario:
         )
 
     @cached_property
+    def target_twists(self) -> Array:
+        """Body twists (n + 1, 6) of `targets`."""
+        reference, times = self.reference, self._target_times
+        twists = np.array([reference.velocity(tau) for tau in times.tolist()])
+        if not reference.moving:
+            return twists
+        left = reference.duration - times
+        shares = np.where(left < REST_ROUNDING_S, 0.0, np.minimum(1.0, left / self.dt))
+        shared: Array = shares[:, None] * twists
+        return shared
+
+    @cached_property
     def path(self) -> ReferencePath | None:
         """The path of the reference; None for a target at rest."""
         reference = self.reference

@@ -60,7 +60,7 @@ class ManyTimeClocks:
             rotations, translations = scenario.target_arrays
             n = scenario.steps
             self._rotations[:n, row], self._translations[:n, row] = rotations[:n], translations[:n]
-            self._twists[:n, row] = [twist.vector for _, twist in scenario.targets[:n]]
+            self._twists[:n, row] = scenario.target_twists[:n]
 
     def targets(self) -> ManyTargets:
         """See `ManyClocks`."""

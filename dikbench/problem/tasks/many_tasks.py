@@ -12,7 +12,7 @@ from dikbench.arrays import Array
 from dikbench.linear_algebra import scaled_identity
 from dikbench.problem.tasks.damping import DampingTask
 from dikbench.problem.tasks.orientation import LinearizedOrientation, OrientationTask
-from dikbench.problem.tasks.pose import LinearizedPose, PoseTask
+from dikbench.problem.tasks.pose import LinearizedPose, PoseTask, goes_along_screw
 from dikbench.problem.tasks.position import PositionTask
 from dikbench.problem.tasks.posture import PostureTask
 from dikbench.problem.tasks.task import (
@@ -24,7 +24,7 @@ from dikbench.problem.tasks.task import (
 )
 from dikbench.robots.many_kinematics import ManyKinematics
 from dikbench.robots.robot import Robot
-from dikbench.robots.task_rows import ALL_ROWS, PLANE_ROWS
+from dikbench.robots.task_rows import ALL_ROWS
 
 SERIES_ANGLE = 1e-2
 """Below this angle [rad] quotients of its functions are computed by series."""
@@ -59,14 +59,9 @@ def kind_of_tracking(task: TrackingTask, robot: Robot) -> Hashable | None:
 
 def _asks_for_few_turns(task: Any, robot: Robot) -> bool:
     """Whether one or two of three angular rows are asked for, whose errors are special."""
-    if not isinstance(task, PoseTask) or _is_whole(robot):
+    if not isinstance(task, PoseTask) or goes_along_screw(robot):
         return False
     return 0 < sum(row >= 3 for row in robot.task_rows) < 3
-
-
-def _is_whole(robot: Robot) -> bool:
-    """Whether pose tasks are brought to their target along a screw."""
-    return robot.task_rows in (ALL_ROWS, PLANE_ROWS) and robot.task_axes == "body"
 
 
 def kind_of_task(task: Task) -> Hashable | None:
@@ -89,7 +84,7 @@ def linearize_tracking(
     away = turned(R.transpose(0, 2, 1), targets.translations - kinematics.translations)
     linear = turned(relative, targets.twists[:, :3])
     angular = turned(relative, targets.twists[:, 3:])
-    if isinstance(task, PoseTask) and _is_whole(robot):
+    if isinstance(task, PoseTask) and goes_along_screw(robot):
         error = logarithms(relative, away)
         V = np.concatenate([linear + crossed(away, angular), angular], axis=1)
         rows = slice(None) if robot.task_rows == ALL_ROWS else np.array(robot.task_rows)
@@ -143,7 +138,7 @@ def row_of(many: LinearizedTask, k: int, task: Any, robot: Robot, relative: Any)
     parts = (J, many.V[k], many.error[k], many.weight, many.priority)
     if isinstance(many, LinearizedJointTask):
         return LinearizedJointTask(*parts)
-    if isinstance(task, PoseTask) and _is_whole(robot):
+    if isinstance(task, PoseTask) and goes_along_screw(robot):
         rows = None if robot.task_rows == ALL_ROWS else np.array(robot.task_rows)
         return LinearizedPose(*parts, relative, rows)
     if isinstance(task, OrientationTask):

@@ -20,6 +20,12 @@ TILTS: Final = frozenset({3, 4})
 """The rows of turns about axes in the plane."""
 
 
+def goes_along_screw(robot: Robot) -> bool:
+    """Say whether pose tasks bring a frame to its target along a screw (see `PoseTask`)."""
+    in_plane = robot.task_rows == PLANE_ROWS and not TILTS & {*robot.movable_rows}
+    return (in_plane or robot.task_rows == ALL_ROWS) and robot.task_axes == "body"
+
+
 @dataclass(frozen=True, eq=False)
 class PoseTask(FrameTask):
     """Bring a frame of the robot to a placement in the world.
@@ -57,8 +63,7 @@ class PoseTask(FrameTask):
         check_rotation("pose task", X_d.rotation)
         check_weight("pose task", self.weight, len(robot.task_rows))
         X = kinematics.placement(index)
-        in_plane = robot.task_rows == PLANE_ROWS and not TILTS & {*robot.movable_rows}
-        if not (in_plane or robot.task_rows == ALL_ROWS) or robot.task_axes == "world":
+        if not goes_along_screw(robot):
             return self._parts(kinematics, X, X_d, velocity)
         relative = X.actInv(X_d)
         error: Array = pin.log6(relative).np

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
 from dikbench.arrays import Array, Mask
 from dikbench.solvers.recheck.stack import Stack
-
-EIGENVALUE_SAMPLE_STRIDE: Final = 16
-"""The smallest eigenvalue is guessed from one matrix in this many."""
 
 
 class Residuals:
@@ -121,23 +116,19 @@ def _nearness(stack: Stack, gradient: Array, slack: Array) -> Array:
 
 
 def _softness(P: Array) -> Array:
-    """Compute 1/mu for P (k, n, n), mu a lower bound on the eigenvalues; infinite if indefinite.
+    """Compute the Frobenius norms of the inverses of P (k, n, n): at least 1/mu each, (k,).
 
-    One mu for all is guessed from a few matrices and proved by a factorisation of P - mu I, which
-    is faster than an inverse of each matrix.
+    mu is the smallest eigenvalue; infinite where a matrix is not positive definite. What others
+    there are does not matter.
     """
     try:
-        mu = 0.5 / np.linalg.norm(np.linalg.inv(P[::EIGENVALUE_SAMPLE_STRIDE]), axis=(1, 2)).max()
-        np.linalg.cholesky(P - mu * np.eye(P.shape[1]))
-        return np.full(len(P), 1 / mu)
-    except np.linalg.LinAlgError:
-        pass
-    try:
         np.linalg.cholesky(P)
-        inverses: Array = np.linalg.norm(np.linalg.inv(P), axis=(1, 2))
-        return inverses
-    except np.linalg.LinAlgError:  # one is not definite; the judge solves each program
-        return np.full(len(P), np.inf)
+        softness: Array = np.linalg.norm(np.linalg.inv(P), axis=(1, 2))
+        return softness
+    except np.linalg.LinAlgError:  # one is not definite: the judge solves its program
+        if len(P) == 1:
+            return np.array([np.inf])
+        return np.concatenate([_softness(one[None]) for one in P])
 
 
 def _dots(a: Array, b: Array) -> Array:

@@ -17,7 +17,12 @@ from dikbench.problem.problem import Formulation, is_batched, program_of
 from dikbench.scenario.scenario import Scenario
 from dikbench.simulation.clock import ReferenceMode
 from dikbench.simulation.closed_loop import Run, simulate
-from dikbench.simulation.lockstep import LockstepRun, kind_of, simulate_together
+from dikbench.simulation.lockstep import (
+    LockstepRun,
+    LockstepTrial,
+    kind_of,
+    simulate_together,
+)
 from dikbench.simulation.status import STEP_CODE, Status
 from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, parse_solver
 from dikbench.solvers.checked_solve import CheckedSolve, make_solve
@@ -59,15 +64,12 @@ def _together(
     mode: ReferenceMode = "time",
     seeds: list[int] | None = None,
 ) -> list[LockstepRun]:
-    return simulate_together(
-        scenarios,
-        formulation,
-        [_solve(formulation) for _ in scenarios],
-        make_plant(plant),
-        mode,
-        [*range(len(scenarios))] if seeds is None else seeds,
-        guesses=True,
-    )
+    numbers = range(len(scenarios)) if seeds is None else seeds
+    trials = [
+        LockstepTrial(scenario, formulation, _solve(formulation), seed, guesses=True)
+        for scenario, seed in zip(scenarios, numbers, strict=True)
+    ]
+    return simulate_together(trials, make_plant(plant), mode)
 
 
 def _alone(
