@@ -66,8 +66,7 @@ class AskedTogether:
         v = self._together(problem, self.solves)
         if v is not None:
             self.rechecked = None if self._many is None else self._many.rechecked
-            answered: Mask = finite & np.isfinite(v).all(axis=1)
-            return v, np.logical_not(answered)
+            return v, _unanswered(v) | ~finite
         v, records = np.full(shape, np.nan), RecheckedSteps(len(self.solves))
         for row in np.flatnonzero(finite).tolist():
             one = self._together(part_of(problem, slice(row, row + 1)), self.solves[row : row + 1])
@@ -76,7 +75,7 @@ class AskedTogether:
                 if self._many is not None:
                     _copy(self._many.rechecked, records, row)
         self.rechecked = None if self._many is None else records
-        return v, np.isnan(v).any(axis=1)
+        return v, _unanswered(v)
 
     def _together(self, problem: DikProblem, solves: Sequence[CheckedSolve]) -> Array | None:
         """Ask for rows at once; None where that raises or is no array of velocities."""
@@ -117,6 +116,12 @@ def _finite_rows(problem: DikProblem) -> Mask:
     if not finite.all():  # the squares may overflow
         finite = np.logical_and.reduce([np.isfinite(part).all(axis=1) for part in parts])
     return finite
+
+
+def _unanswered(v: Array) -> Mask:
+    """Say which rows of velocities (n, nv) are no answers, (n,)."""
+    unanswered: Mask = np.logical_not(np.isfinite(v).all(axis=1))
+    return unanswered
 
 
 def _copy(source: RecheckedSteps, target: RecheckedSteps, row: int) -> None:
