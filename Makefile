@@ -29,7 +29,8 @@ quick:           ## the default study
 	.venv/bin/dikbench run
 
 benchmark:       ## how fast the harness is, against its peers (let nothing else run)
-	$(PYTHON) -m pip install --quiet -e ".[peers,drake]" && $(PYTHON) tests/benchmarks/ratios.py
+	$(PYTHON) -m pip install --quiet -e ".[peers,drake]" && $(PYTHON) tests/benchmarks/ratios.py \
+	  && $(PYTHON) tests/benchmarks/lockstep.py
 
 benchmark-scenarios:  ## how long each scenario takes to build
 	$(PYTHON) tests/benchmarks/scenario_building.py

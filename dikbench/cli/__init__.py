@@ -179,8 +179,9 @@ def run(
     formulation took a step, 2 where nothing could be run, 130 where the run was stopped.
     """
     from dikbench.report.write import write_report
+    from dikbench.run.in_workers import RunSettings
     from dikbench.run.pool import available_cores
-    from dikbench.run.runner import Interrupted, RunSettings, never_moved, run_study
+    from dikbench.run.runner import Interrupted, never_moved, run_study
 
     selected, folder = _selected(study, axes, out)
     command = shlex.join(["dikbench", *sys.argv[1:]])

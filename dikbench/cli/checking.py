@@ -69,8 +69,8 @@ def _of_study(benchmark: str, out: Path | None, jobs: int | None) -> Iterator[Li
     import shlex
 
     from dikbench.invariants import check_benchmark
+    from dikbench.run.in_workers import RunSettings
     from dikbench.run.pool import available_cores
-    from dikbench.run.runner import RunSettings
     from dikbench.study.study import CHECKED, load_study
 
     study = load_study(benchmark)

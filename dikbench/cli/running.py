@@ -15,8 +15,8 @@ from dikbench.report.write import write_report
 from dikbench.results.reading import Results, load_results
 from dikbench.run import runner
 from dikbench.run.blocks import EngineChoice
+from dikbench.run.in_workers import RunSettings
 from dikbench.run.pool import available_cores
-from dikbench.run.runner import RunSettings
 from dikbench.run.trial_row import TracePolicy
 from dikbench.scenario.plant import REFERENCE_MODES
 from dikbench.study.study import (

@@ -10,7 +10,8 @@ import msgspec
 
 from dikbench.invariants.of_rows import INVARIANTS
 from dikbench.results.reading import read_results, without_attributes
-from dikbench.run.runner import RunSettings, run_study
+from dikbench.run.in_workers import RunSettings
+from dikbench.run.runner import run_study
 from dikbench.scenario.oracle import ORACLES
 from dikbench.study.study import CHECKED, Cells, Study
 from dikbench.testing import straw

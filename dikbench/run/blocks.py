@@ -91,9 +91,9 @@ def _like(scenario: Selector) -> tuple[str, str]:
     return scenario.name, str(dict(scenario.parameters).get("robot", ""))
 
 
-def block_timeout(block: Sequence[PlannedTrial], trial_timeout: float) -> float:
-    """Return the wall-clock limit of a block [s] by that of a trial [s]."""
-    return trial_timeout + SECONDS_PER_TRIAL * len(block)
+def block_timeout(trials: int, trial_timeout: float) -> float:
+    """Return the wall-clock limit of a block of trials [s] by that of a trial [s]."""
+    return trial_timeout + SECONDS_PER_TRIAL * (trials - 1)
 
 
 def smaller(block: Sequence[PlannedTrial]) -> Iterator[list[PlannedTrial]]:

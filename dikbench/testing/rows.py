@@ -76,7 +76,7 @@ def _groups(answers: Sequence[tuple[State, Answer]]) -> list[list[tuple[State, A
 
 def _ask(asked: Asked, problems: Sequence[DikProblem], labels: Sequence[str]) -> Array:
     """Ask for control steps at once, (N, nv)."""
-    many = ManySolve(guesses=True)
+    many = ManySolve(guesses=asked.selector is None)  # a solver that is named is asked always
     many.begin_step([make_solve(asked.solver, asked.program) for _ in problems])
     posed = posed_together(problems)
     try:

@@ -9,7 +9,8 @@ from makers.runs import briefly_timed
 from makers.shared import made_once
 
 from dikbench.report.write import write_report
-from dikbench.run.runner import RunSettings, run_study
+from dikbench.run.in_workers import RunSettings
+from dikbench.run.runner import run_study
 from dikbench.study.study import Selection, load_study, select
 
 

@@ -12,7 +12,8 @@ import time
 from pathlib import Path
 
 from dikbench.results.reading import load_results
-from dikbench.run.runner import RunSettings, run_study
+from dikbench.run.in_workers import RunSettings
+from dikbench.run.runner import run_study
 from dikbench.study.plan import expand
 from dikbench.study.study import Cells, Study
 

@@ -12,8 +12,9 @@ import msgspec
 import pytest
 
 from dikbench.results.folder import ResultsFolder
-from dikbench.run import recompute, runner
-from dikbench.run.runner import RunSettings, run_study
+from dikbench.run import in_workers, recompute, runner
+from dikbench.run.in_workers import RunSettings
+from dikbench.run.runner import run_study
 from dikbench.study.study import Study, TimingSettings
 
 
@@ -41,7 +42,7 @@ def _no_workers(*given: object) -> Iterator[_NoPool]:
 def without_workers() -> Iterator[None]:
     """Have the harness run, time and recompute trials in this process meanwhile."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in (runner, recompute):
+        for module in (in_workers, runner, recompute):
             patch.setattr(module, "workers", _no_workers)
         yield
 

@@ -13,7 +13,7 @@ from dikbench.invariants import INVARIANTS, Invariant, with_straw_laws
 from dikbench.invariants.of_rows import is_straw
 from dikbench.metrics import Outcome
 from dikbench.results.reading import read_results, without_attributes
-from dikbench.run.runner import RunSettings
+from dikbench.run.in_workers import RunSettings
 from dikbench.study.study import Cells, Study
 
 STUDY = Study(

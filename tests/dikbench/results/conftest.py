@@ -9,7 +9,7 @@ import pytest
 from makers.runs import run_here
 from makers.shared import made_once
 
-from dikbench.run.runner import RunSettings
+from dikbench.run.in_workers import RunSettings
 from dikbench.study.study import Cells, Study, TimingSettings
 
 STUDY = Study(

@@ -16,7 +16,8 @@ from dikbench.metrics import METRICS
 from dikbench.report.comparison.comparison import compare
 from dikbench.report.write import write_report
 from dikbench.results.reading import read_results
-from dikbench.run.runner import RunSettings, status_of
+from dikbench.run.in_workers import RunSettings
+from dikbench.run.runner import status_of
 from dikbench.study.study import Cells, Study
 
 DATA = Path(__file__).parents[2] / "data" / "first_release"

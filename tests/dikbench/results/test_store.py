@@ -26,7 +26,8 @@ from dikbench.results.folder import ResultsFolder
 from dikbench.results.reading import load_results
 from dikbench.results.store import Store
 from dikbench.run import runner
-from dikbench.run.runner import RunSettings, status_of, time_study
+from dikbench.run.in_workers import RunSettings
+from dikbench.run.runner import status_of, time_study
 from dikbench.run.trial_row import TracePolicy, run_trial
 from dikbench.study.identity import timing_id, trial_id
 from dikbench.study.plan import PlannedTrial, expand
@@ -74,7 +75,8 @@ import sys
 from pathlib import Path
 sys.path.insert(0, {folder!r})
 from study_of_test import STUDY
-from dikbench.run.runner import RunSettings, run_study
+from dikbench.run.in_workers import RunSettings
+from dikbench.run.runner import run_study
 
 if __name__ == "__main__":
     run_study(STUDY, Path({out!r}), RunSettings(jobs={jobs}), "a script")

@@ -16,7 +16,7 @@ from makers.shared import made_once
 
 from dikbench.results.reading import load_results, read_results
 from dikbench.run import runner
-from dikbench.run.runner import RunSettings
+from dikbench.run.in_workers import RunSettings
 from dikbench.study.plan import PlannedTrial
 from dikbench.study.study import Cells, Study
 

@@ -19,8 +19,9 @@ from dikbench.errors import DikbenchError
 from dikbench.metrics import METRICS
 from dikbench.results.folder import ResultsFolder
 from dikbench.results.reading import load_results
+from dikbench.run.in_workers import RunSettings
 from dikbench.run.recompute import Recomputed, recompute_results
-from dikbench.run.runner import RunSettings, status_of
+from dikbench.run.runner import status_of
 from dikbench.study.study import Cells, Study
 
 STUDY = Study(

@@ -16,7 +16,8 @@ from makers.shared import made_once
 from dikbench.metrics import METRICS
 from dikbench.report.write import write_report
 from dikbench.results.folder import ResultsFolder
-from dikbench.run.runner import RunSettings, run_study, run_trials
+from dikbench.run.in_workers import RunSettings, run_trials
+from dikbench.run.runner import run_study
 from dikbench.study.plan import expand
 from dikbench.study.study import Selection, load_study, select
 

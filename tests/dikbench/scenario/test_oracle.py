@@ -15,7 +15,7 @@ from dikbench.problem.tasks import PositionTask
 from dikbench.results.reading import read_results
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.loading import load_robot
-from dikbench.run.runner import RunSettings
+from dikbench.run.in_workers import RunSettings
 from dikbench.run.trial_row import run_trial
 from dikbench.scenario.oracle import ORACLE, follow, joint_oracle, oracle_motion, solve_placement
 from dikbench.scenario.reference.curves import circle

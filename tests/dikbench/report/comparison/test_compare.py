@@ -16,7 +16,7 @@ from makers.runs import run_here
 from dikbench.cli import commands
 from dikbench.metrics import METRICS
 from dikbench.report.comparison.comparison import compare
-from dikbench.run.runner import RunSettings
+from dikbench.run.in_workers import RunSettings
 from dikbench.study.study import Cells, Study
 
 OLD = Path(__file__).parents[3] / "data" / "first_release"

@@ -38,7 +38,10 @@ def test_columns_and_formulations_are_chosen_in_the_order_given(folder: Path) ->
         "formulation", "solver", "trials", "free space",
     ]  # fmt: skip
     assert [line.split("|")[1].strip() for line in lines[4:6]] == ["lp", "dls[damping=0.1,gain=2]"]
-    assert lines[-1] == "Too few cases for stars: free space (2 scenarios)."
+    assert lines[-1] == (
+        "Too few cases for stars: free space (2 scenarios). "
+        "Samples: free space: 2 scenarios of one robot, ur5."
+    )
 
 
 def test_a_table_without_rows_says_why(tmp_path: Path) -> None:

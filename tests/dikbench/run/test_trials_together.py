@@ -1,0 +1,270 @@
+"""Runs in lockstep: the rows of runs alone, whatever ends a worker, however they are divided."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pandas as pd
+import pinocchio as pin
+import pytest
+from makers.runs import run_here, without_workers
+
+from dikbench import load_results
+from dikbench.errors import DikbenchError
+from dikbench.plugins.building import make_formulation, make_scenario
+from dikbench.plugins.finding import plugins
+from dikbench.results.folder import ResultsFolder
+from dikbench.results.store import Store
+from dikbench.run import blocks
+from dikbench.run.in_workers import RunSettings, run_trials
+from dikbench.run.runner import Interrupted
+from dikbench.run.trial_row import TrialRow, solve_of
+from dikbench.scenario.plant import Ideal
+from dikbench.selector import parse_selector
+from dikbench.simulation.closed_loop import simulate
+from dikbench.study.plan import PlannedTrial, expand
+from dikbench.study.study import Selection, Study, load_study, select
+
+NEAR_MISSES = (
+    "near-miss[robot=panda,dt=0.05,miss=0.01|0.02|0.03,speed=0.3]",
+    "near-miss[robot=ur5,dt=0.05,miss=0.03]",
+)
+OF_SOLVERS = {
+    "lied", "claimed_share", "verified_share", "primal_residual_max", "dual_residual_max",
+    "gap_max", "optimum_distance_max_rad_s",
+}  # fmt: skip
+"""What is about the solver's answer and not about the motion."""
+NOT_COMPARED = {"wall_time_s", "control_time_s", "described", "asked_alone_steps"}
+
+HOSTILE = '''
+import os
+from dataclasses import dataclass
+from dikbench.problem import least_norm
+
+@dataclass(frozen=True)
+class Hostile:
+    """Goes wrong where it is asked for many, for a robot of six joints or for all."""
+
+    how: str = "raise"
+    batched = True
+
+    def velocity(self, problem, solve):
+        if self.how == "exit" or (self.how == "ur5 exits" and problem.robot.nv == 6):
+            os._exit(3)
+        if self.how == "raise":
+            raise RuntimeError("no")
+        return least_norm(problem.primary.J, problem.primary.V, 1e-6)
+'''
+
+
+def _study(formulations: Sequence[str], scenarios: Sequence[str] = NEAR_MISSES) -> Study:
+    selection = Selection(
+        formulations=tuple(formulations),
+        scenarios=tuple(scenarios),
+        plants=("ideal",),
+        seeds=(0, 1),
+    )
+    return select(load_study("smoke"), selection, named=False)
+
+
+def _rows(study: Study, out: Path, engine: blocks.Engine, jobs: int = 1) -> dict[str, TrialRow]:
+    folder = ResultsFolder(out)
+    folder.traces.mkdir(parents=True)
+    settings = RunSettings(jobs=jobs, engine=engine)
+    found = run_trials(expand(study), folder, settings, engine=engine)
+    return {p.id: row for some in found for p, row in some}
+
+
+def _assert_same(made: TrialRow, known: TrialRow, tolerance: float) -> None:
+    """Assert that two rows of a trial tell of the same motion."""
+    for name in made.keys() | known.keys():
+        if name in NOT_COMPARED | OF_SOLVERS:
+            continue
+        one, other = made.get(name), known.get(name)
+        if isinstance(one, float | np.floating) and isinstance(other, float | int | np.floating):
+            assert one == pytest.approx(other, rel=tolerance, abs=tolerance, nan_ok=True), name
+        else:
+            assert one == other, name
+
+
+def test_rows_are_those_of_runs_alone(tmp_path: Path) -> None:
+    """By both engines; who cannot answer many runs alone, inside the same blocks."""
+    study = _study(["dls", "pinv[after=clip]", "qp", "lp-alpha", "hqp", "oracle"])
+    with without_workers():
+        alone = _rows(study, tmp_path / "alone", "alone")
+        together = _rows(study, tmp_path / "together", "lockstep")
+    assert together.keys() == alone.keys()
+    for trial, row in together.items():
+        _assert_same(row, alone[trial], 1e-8)
+        asked = row["formulation"] in ("hqp", "oracle") or row["status"] == "skipped"
+        assert ("asked_alone_steps" in row) != asked
+    names = [
+        sorted(path.name for path in (tmp_path / e).rglob("*.arrow")) for e in ("alone", "together")
+    ]
+    assert names[0] == names[1]
+    assert len(names[0]) > 40
+
+
+def test_a_run_is_the_same_with_one_worker_and_with_two(tmp_path: Path) -> None:
+    """To the bit, though the blocks are others; what ends a worker costs its own rows only."""
+    (tmp_path / "hostile.py").write_text(HOSTILE)
+    hostile = f"{tmp_path}/hostile.py:Hostile"
+    study = _study(["dls", "qp", f"{hostile}[how='ur5 exits']", f"{hostile}[how=raise]"])
+    one = _rows(study, tmp_path / "one", "lockstep", jobs=1)
+    two = _rows(study, tmp_path / "two", "lockstep", jobs=2)
+    assert one.keys() == two.keys()
+    for trial, row in one.items():
+        compared = row.keys() - NOT_COMPARED
+        assert {name: str(row[name]) for name in compared} == {
+            name: str(two[trial][name]) for name in compared
+        }
+        if "exits" in row["formulation"] and "ur5" in row["scenario"]:
+            assert row["status"] == "crashed"
+        elif "raise" in row["formulation"]:
+            assert row["status"] == "formulation-error"
+            assert row["message"].startswith("step 0: RuntimeError: no")
+        else:
+            assert row["status"] in ("ok", "skipped"), row
+
+
+def test_a_run_that_is_stopped_goes_on_to_the_same_rows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What was committed is kept, whole blocks of it, and nothing runs twice."""
+    study = msgspec.structs.replace(_study(["dls", "qp"]), timing=None)
+    settings = RunSettings(jobs=2, engine="lockstep", traces="none")
+    run_here(study, tmp_path / "whole", settings, "a test")
+    record = Store.record_trials
+    committed: list[int] = []
+
+    def stopped(store: Store, rows: Any, run: int) -> None:
+        if len(committed) == 2:
+            raise KeyboardInterrupt
+        record(store, rows, run)
+        committed.append(len(rows))
+
+    monkeypatch.setattr(Store, "record_trials", stopped)
+    with pytest.raises(Interrupted, match=r"trials are done and kept"):
+        run_here(study, tmp_path / "stopped", settings, "a test")
+    done = sum(committed)
+    monkeypatch.setattr(Store, "record_trials", record)
+    kept = load_results(tmp_path / "stopped").trials
+    assert 0 < len(kept) == done
+    # Without its engine being named, that of its rows is kept.
+    run_here(study, tmp_path / "stopped", RunSettings(jobs=2, traces="none"), "a test")
+    found, known = (load_results(tmp_path / each).trials for each in ("stopped", "whole"))
+    dropped = ["run", "environment"]
+    pd.testing.assert_frame_equal(
+        found.drop(columns=dropped), known.drop(columns=dropped), check_exact=True
+    )
+
+
+def test_the_engine_is_chosen_once(tmp_path: Path) -> None:
+    """Many of a kind run in lockstep, a few alone; rows of both are not mixed."""
+    few = msgspec.structs.replace(_study(["dls"], NEAR_MISSES[1:]), timing=None)
+    many = msgspec.structs.replace(_study(["dls"]), seeds=tuple(range(5)), timing=None)
+    for study, engine in ((few, "alone"), (many, "lockstep")):
+        out = tmp_path / engine
+        run_here(study, out, RunSettings(jobs=1, traces="none"), "a test")
+        results = load_results(out)
+        assert results.manifest["engine"] == engine
+        assert results.trials["asked_alone_steps"].notna().any() == (engine == "lockstep")
+        other: Any = "lockstep" if engine == "alone" else "alone"
+        with pytest.raises(DikbenchError, match=rf"engine={engine}; valid: that, or another"):
+            run_here(study, out, RunSettings(jobs=1, engine=other), "a test")
+
+
+def _planned(cells: Sequence[tuple[str, str]]) -> list[PlannedTrial]:
+    study = _study(["dls"])
+    first = expand(study)[0]
+    return [
+        PlannedTrial(
+            str(number),
+            replace(
+                first.trial,
+                scenario=parse_selector(scenario),
+                formulation=parse_selector(formulation),
+            ),
+        )
+        for number, (formulation, scenario) in enumerate(cells)
+    ]
+
+
+@pytest.mark.parametrize("jobs", [1, 2, 16])
+def test_blocks_hold_every_trial_once(jobs: int) -> None:
+    """All of a scenario in one block; families and robots beside their like; enough for all."""
+    cells = [
+        (formulation, f"near-miss[robot={robot},miss={miss}]")
+        for miss in range(1, 40)
+        for robot in ("panda", "ur5")
+        for formulation in ("dls", "qp", "pinv")
+    ]
+    planned = _planned(cells)
+    found = blocks.blocks_of(planned, jobs)
+    assert sorted(p.id for block in found for p in block) == sorted(p.id for p in planned)
+    assert len(found) >= min(78, 2 * jobs)
+    for block in found:
+        scenarios = {p.trial.scenario for p in block}
+        assert len(block) == 3 * len(scenarios)
+    changes = [p.trial.scenario.parameters["robot"] for block in found for p in block]
+    assert sum(a != b for a, b in pairwise(changes)) == 1
+
+
+def test_a_block_that_ended_its_worker_becomes_smaller() -> None:
+    """By formulation first, then trial by trial."""
+    block = _planned([(law, f"reach[speed={k}]") for law in ("dls", "qp") for k in (1, 2, 3)])
+    halves = list(blocks.smaller(block))
+    assert [[str(p.trial.formulation) for p in half] for half in halves] == [
+        ["dls"] * 3, ["qp"] * 3,
+    ]  # fmt: skip
+    assert [len(single) for single in blocks.smaller(halves[0])] == [1, 1, 1]
+
+
+SENSITIVE_RAD = 1e-12
+"""How far a start is moved to see whether rounding grows by itself."""
+
+
+def _grows(row: TrialRow) -> bool:
+    """Say whether a trial alone differs from itself with another rounding."""
+    scenario = make_scenario(row["scenario"], row["seed"])
+    selector, solver = parse_selector(row["formulation"]), parse_selector(row["solver"])
+    mode: Any = row["reference"]
+    applied = []
+    for step in (0.0, SENSITIVE_RAD):
+        q0 = pin.integrate(scenario.robot.model, scenario.q0, np.full(scenario.robot.nv, step))
+        moved = replace(scenario, q0=q0)
+        run = simulate(moved, make_formulation(selector), solve_of(selector, solver), Ideal(), mode)
+        applied.append(run.trace.applied)
+    steps = min(map(len, applied))
+    return bool(np.abs(applied[0][:steps] - applied[1][:steps]).max() > 1e-8)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("reference", ["time", "path"])
+def test_one_scenario_of_each_family_with_every_formulation(tmp_path: Path, reference: str) -> None:
+    """Equal to 1e-8 in every physical column, or rounding grows in the trial alone, too."""
+    selection = Selection(
+        formulations=tuple(plugins("formulation")),
+        scenarios=tuple(name for name in plugins("scenario") if name != "csv"),
+        plants=("ideal",),
+        references=(reference,),
+        seeds=(0,),
+    )
+    study = select(load_study("smoke"), selection, named=False)
+    alone = _rows(study, tmp_path / "alone", "alone", jobs=2)
+    together = _rows(study, tmp_path / "together", "lockstep", jobs=2)
+    grown = []
+    for trial, row in together.items():
+        try:
+            _assert_same(row, alone[trial], 1e-8)
+        except AssertionError:
+            assert _grows(alone[trial]), row
+            grown.append(f"{row['formulation']} on {row['scenario']}")
+    print(f"{len(together)} trials; rounding grows in {len(grown)}: {', '.join(grown)}")
+    assert len(grown) <= len(together) // 20
