@@ -8,7 +8,10 @@ from itertools import groupby
 from typing import Final, Literal
 
 from dikbench.errors import DikbenchError
+from dikbench.plugins.building import make_formulation
+from dikbench.problem.problem import is_batched
 from dikbench.results.store import Store
+from dikbench.scenario.oracle import ORACLES
 from dikbench.selector import Selector
 from dikbench.study.plan import PlannedTrial
 
@@ -17,8 +20,8 @@ Engine = Literal["alone", "lockstep"]
 
 EngineChoice = Literal["auto", "alone", "lockstep"]
 
-LEAST_ROWS: Final = 8
-"""Lockstep pays from so many trials of one formulation, family, plant and clock on."""
+LEAST_ROWS: Final = 32
+"""Lockstep pays from so many trials of one family, robot, plant and clock on."""
 
 MOST_SCENARIOS: Final = 128
 """Largest number of scenarios of a block ..."""
@@ -38,8 +41,8 @@ def engine_of(planned: Sequence[PlannedTrial], choice: EngineChoice, store: Stor
 
     Args:
         planned: its trials.
-        choice: the engine, or `auto`: lockstep where `LEAST_ROWS` trials on average share
-            formulation, solver, family, plant and clock.
+        choice: the engine, or `auto`: lockstep where `LEAST_ROWS` trials, on average, of
+            formulations that answer many at once share family, robot, plant and clock.
         store: of the results.
 
     Raises:
@@ -59,8 +62,9 @@ def engine_of(planned: Sequence[PlannedTrial], choice: EngineChoice, store: Stor
     if choice != "auto":
         return choice
     kinds = Counter(
-        (trial.formulation, trial.solver, trial.scenario.name, trial.plant, trial.reference)
+        (*_like(trial.scenario), trial.plant, trial.reference)
         for trial in (p.trial for p in planned if not p.skip)
+        if trial.formulation.name not in ORACLES and is_batched(make_formulation(trial.formulation))
     )
     return "lockstep" if kinds and kinds.total() / len(kinds) >= LEAST_ROWS else "alone"
 

@@ -165,9 +165,16 @@ def _ways(trials: pd.DataFrame) -> list[Limitation]:
         "answer can look better than the right one."
     )
     wall, control = trials["wall_time_s"].sum(), trials["control_time_s"].sum()
-    if wall > 0:
+    together = int(trials["asked_alone_steps"].notna().sum())
+    if together:
         found.append(
-            f"Of the workers' time {100 * control / wall:.0f} % went into kinematics, laws and "
+            f"{several(together, 'trial')} ran in lockstep, many at a time: the numbers are those "
+            "of runs alone but for rounding."
+        )
+    if wall > 0:
+        of = " in trials that ran alone" if together else ""
+        found.append(
+            f"Of the workers' time{of} {100 * control / wall:.0f} % went into kinematics, laws and "
             "solvers, the rest into the harness (plant, records, recheck, metrics, traces)."
         )
     return [Limitation(text) for text in found]
