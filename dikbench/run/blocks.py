@@ -20,7 +20,7 @@ Engine = Literal["alone", "lockstep"]
 
 EngineChoice = Literal["auto", "alone", "lockstep"]
 
-LEAST_ROWS: Final = 32
+LEAST_ROWS: Final = 64
 """Lockstep pays from so many trials of one family, robot, plant and clock on."""
 
 MOST_SCENARIOS: Final = 128
