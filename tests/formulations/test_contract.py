@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import typing
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
+from importlib import import_module
+from itertools import islice
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -27,6 +30,7 @@ from dikbench.testing import (
     check_repeatable,
     check_sight,
 )
+from dikbench.testing.states import states
 
 LAWS = sorted(plugins("formulation"))
 
@@ -58,12 +62,37 @@ def asked(name: str) -> Asked:
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
 @pytest.mark.parametrize("name", LAWS)
 def test_registered_law_keeps_the_contract(name: str, check: Check) -> None:
-    """Every registered law keeps every clause of the contract."""
-    check(asked(name), None)
+    """Every registered law keeps every clause of the contract; asked again at some states."""
+    if check in ASK_AGAIN:
+        with few_states(LAWS.index(name)):
+            check(make_formulation(name), None)
+    else:
+        check(asked(name), None)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", LAWS)
+def test_registered_law_keeps_every_clause_at_every_state(name: str) -> None:
+    """The same, without turns."""
+    check_formulation(make_formulation(name))
 
 
 ASK_AGAIN = (check_sight, check_inputs_untouched, check_repeatable, check_picklable)
-"""Checks that ask a law again at all states; the others share one answer at each."""
+"""Checks that ask a law again at its states; the others share one answer at each."""
+
+STRIDE = 7
+"""One state in so many is asked again in the normal run. No period of the states divides it: all
+speeds, limits, rows and motions before come up."""
+
+
+@contextmanager
+def few_states(turn: int) -> Iterator[None]:
+    """Have the contract ask at one state in so many meanwhile, the first of them in turns."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("asked", "contract", "sight"):
+            module = import_module(f"dikbench.testing.{name}")
+            patch.setattr(module, "states", lambda: islice(states(), turn % STRIDE, None, STRIDE))
+        yield
 
 
 @pytest.mark.parametrize(("turn", "selector"), [*enumerate(variants(every=False))])
@@ -74,8 +103,10 @@ def test_switched_law_keeps_the_contract(turn: int, selector: str) -> None:
     """
     once = Asked(make_formulation(selector))
     for check in CHECKS:
-        if check not in ASK_AGAIN or check is ASK_AGAIN[turn % len(ASK_AGAIN)]:
+        if check not in ASK_AGAIN:
             check(once, None)
+    with few_states(turn):
+        ASK_AGAIN[turn % len(ASK_AGAIN)](make_formulation(selector), None)
 
 
 @pytest.mark.long
@@ -85,31 +116,36 @@ def test_switched_law_keeps_every_clause_of_the_contract(selector: str) -> None:
     check_formulation(make_formulation(selector))
 
 
-@pytest.mark.parametrize(
-    "selector",
-    [
-        "nullspace[damping=0.1,projector=damped]",
-        "nullspace-robust[damping=0.1,projector=damped]",
-        "joint-centering[damping=0.1,projector=damped]",
-        "weighted-least-norm[damping=0.1]",
-    ],
+DAMPED = (
+    "nullspace[damping=0.1,projector=damped]",
+    "nullspace-robust[damping=0.1,projector=damped]",
+    "joint-centering[damping=0.1,projector=damped]",
+    "weighted-least-norm[damping=0.1]",
 )
-def test_damped_law_keeps_the_contract(selector: str) -> None:
-    """Laws that are not damped by default keep the contract with damping."""
-    check_formulation(make_formulation(selector))
+OTHER_WAYS = [*((law, None) for law in DAMPED), ("qp", "osqp"), ("qp", "piqp")]
+"""Laws that are not damped by default, and solvers of other kinds than the default."""
 
 
-@pytest.mark.parametrize("solver", ["osqp", "piqp"])
-def test_qp_keeps_the_contract_with_other_solvers(solver: str) -> None:
-    """The quadratic program keeps the contract with solvers of other kinds than the default."""
-    check_formulation(make_formulation("qp"), solver)
+@pytest.mark.parametrize(("turn", "way"), [*enumerate(OTHER_WAYS)])
+def test_law_keeps_the_contract_in_other_ways(turn: int, way: tuple[str, str | None]) -> None:
+    """With damping, and through another solver; at one state in so many."""
+    selector, solver = way
+    with few_states(turn):
+        check_formulation(make_formulation(selector), solver)
 
 
-@pytest.mark.parametrize("solver", ["clarabel", "osqp", "scs", "highs"])
-def test_cvxpy_remembers_nothing(solver: str) -> None:
+@pytest.mark.long
+@pytest.mark.parametrize(("selector", "solver"), OTHER_WAYS)
+def test_law_keeps_every_clause_in_other_ways(selector: str, solver: str | None) -> None:
+    """The same, at all states."""
+    check_formulation(make_formulation(selector), solver)
+
+
+@pytest.mark.parametrize(("turn", "solver"), [*enumerate(["clarabel", "osqp", "scs", "highs"])])
+def test_cvxpy_remembers_nothing(turn: int, solver: str) -> None:
     """Solvers behind cvxpy start afresh although its compiled problems are shared and kept."""
-    check = next(check for check in CHECKS if check.__name__ == "check_repeatable")
-    check(make_formulation("lp-alpha-cvxpy"), solver)
+    with few_states(turn):
+        check_repeatable(make_formulation("lp-alpha-cvxpy"), solver)
 
 
 @dataclass(frozen=True)

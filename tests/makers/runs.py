@@ -11,6 +11,7 @@ from typing import Any
 import msgspec
 import pytest
 
+from dikbench.report import write
 from dikbench.results.folder import ResultsFolder
 from dikbench.run import in_workers, recompute, runner
 from dikbench.run.in_workers import RunSettings
@@ -44,6 +45,14 @@ def without_workers() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         for module in (in_workers, runner, recompute):
             patch.setattr(module, "workers", _no_workers)
+        yield
+
+
+@contextmanager
+def without_figures() -> Iterator[None]:
+    """Have reports drawn without their figures meanwhile, which take most of their time."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(write, "draw_figures", lambda *given: [])
         yield
 
 

@@ -89,10 +89,22 @@ def _assert_equal(together: Run, alone: Run, tolerance: float) -> None:
         assert np.array_equal(getattr(together.trace, name), getattr(alone.trace, name)), name
 
 
-@pytest.mark.parametrize("law", ["dls", "pinv[after=scale]", "qp", "lp-alpha", "nullspace"])
-@pytest.mark.parametrize("kind", KINDS)
+LAWS = ("dls", "pinv[after=scale]", "qp", "lp-alpha", "nullspace")
+
+
+@pytest.mark.parametrize(
+    ("kind", "law"),
+    [
+        pytest.param(kind, law, marks=() if (2 * place - number) % 5 < 2 else pytest.mark.long)
+        for place, kind in enumerate(KINDS)
+        for number, law in enumerate(LAWS)
+    ],
+)
 def test_trials_are_what_they_are_alone(kind: str, law: str) -> None:
-    """Every kind of scenario by the clock; those of one group in one lockstep."""
+    """Every kind of scenario by the clock; those of one group in one lockstep.
+
+    The normal run has two laws of each kind, in turns.
+    """
     formulation = make_formulation(law)
     groups: dict[Any, list[Scenario]] = {}
     for selector in KINDS[kind]:
@@ -121,13 +133,20 @@ def test_every_plant_and_clock(law: str, plant: str, mode: ReferenceMode) -> Non
 
 
 @pytest.mark.parametrize(
-    "law", ["dls", "pinv[after=clip]", "tsvd", "jparse", "qp", "lp-alpha", "hqp"]
-)
-@pytest.mark.parametrize(
-    ("plant", "mode"), [("ideal", "time"), ("saturating[noise=1e-4]", "path")], ids=str
+    ("law", "plant", "mode"),
+    [
+        pytest.param(law, *way, marks=() if (place + turn) % 2 == 0 else pytest.mark.long)
+        for place, law in enumerate(
+            ("dls", "pinv[after=clip]", "tsvd", "qp", "lp-alpha", "jparse", "hqp")
+        )
+        for turn, way in enumerate((("ideal", "time"), ("saturating[noise=1e-4]", "path")))
+    ],
 )
 def test_a_trial_does_not_know_the_others(law: str, plant: str, mode: ReferenceMode) -> None:
-    """To the bit, with whatever it runs beside: in another order, in a part, alone."""
+    """To the bit, with whatever it runs beside: in another order, in a part, alone.
+
+    The normal run has each law in one of two ways, in turns.
+    """
     formulation, scenarios = make_formulation(law), [_scenario(each) for each in NEAR_MISSES]
     whole = _together(scenarios, formulation, plant, mode)
     for rows in ([3, 2, 1, 0], [0, 2], [1]):
