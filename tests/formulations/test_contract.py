@@ -378,13 +378,14 @@ BROKEN: list[tuple[typing.Any, set[str]]] = [
 
 
 def failing(law: Formulation) -> set[str]:
-    """Names of the checks that a law fails."""
+    """Names of the checks that a law fails, asked at one state in so many."""
     names, once = set(), Asked(law)
-    for check in CHECKS:
-        try:
-            check(once, None)
-        except AssertionError:
-            names.add(check.__name__)
+    with few_states(0):
+        for check in CHECKS:
+            try:
+                check(once, None)
+            except AssertionError:
+                names.add(check.__name__)
     return names
 
 

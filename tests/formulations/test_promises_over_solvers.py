@@ -32,7 +32,7 @@ pytestmark = [
 
 LAWS = [name for name in sorted(plugins("formulation")) if program_of(make_formulation(name))]
 SOLVERS = [f"{name}[interface={way}]" for name in BACK_ENDS for way in BACK_ENDS[name].interfaces]
-STRIDE = 7
+STRIDE = 13
 """One state in so many is asked in the normal run. No period of the states divides it: all speeds,
 limits, rows and motions before come up."""
 
@@ -90,7 +90,7 @@ def kept_promises(formulation: Formulation, solver: Solver, stride: int) -> int:
 @pytest.mark.parametrize("law", LAWS)
 def test_promises_are_kept_with_every_solver(law: str, solver: str) -> None:
     """At every state with a verified answer, and there are some; unverified ones are not judged."""
-    assert kept_promises(*asked(law, solver), STRIDE) >= 5
+    assert kept_promises(*asked(law, solver), STRIDE) >= 3
 
 
 @pytest.mark.long

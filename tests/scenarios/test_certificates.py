@@ -44,7 +44,7 @@ EXTRA = {
     ("obstacle", "lwr"): ["where=elbow"],
 }
 SEEDS = (1, 2, 3, 4, 5)
-FEW = (0, 1, 2)
+FEW = (0, 1)
 
 
 CLOSED = [name for name in SCENARIOS if name != "csv"]
@@ -72,13 +72,13 @@ IN_TURNS = [
         selector,
         seed,
         marks=()
-        if seed == k % (len(SEEDS) + 1) or (selector in FIRST and seed in FEW)
+        if (k % 2 == 0 and seed == k // 2 % (len(SEEDS) + 1)) or (selector in FIRST and seed in FEW)
         else pytest.mark.long,
     )
     for k, selector in enumerate(SELECTORS)
     for seed in (0, *SEEDS)
 ]
-"""Every selector with every seed; the normal run has one seed of each, in turns.
+"""Every selector with every seed; the normal run has one seed of every second one, in turns.
 
 The first selector of a family has a few of them there too.
 """
@@ -174,7 +174,7 @@ def _samples(scenario: Scenario) -> list[Array]:
 @pytest.mark.parametrize("selector", ONCE_A_FAMILY)
 def test_the_same_seed_is_the_same_scenario(selector: str) -> None:
     """To the bit: start, velocity, path, duration and certificate."""
-    a, b = scenario_of(selector, 2), make_scenario(selector, 2)
+    a, b = scenario_of(selector, 1), make_scenario(selector, 1)
     assert np.array_equal(a.q0, b.q0)
     assert np.array_equal(a.v0, b.v0)
     assert np.array_equal(_samples(a), _samples(b))

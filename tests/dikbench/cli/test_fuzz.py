@@ -91,7 +91,7 @@ def _one_line(error: DikbenchError) -> None:
 
 
 @pytest.mark.filterwarnings("ignore")
-@settings(max_examples=EXAMPLES // 2, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=EXAMPLES // 4, deadline=None, suppress_health_check=list(HealthCheck))
 @given(text=studies())
 def test_a_study_file_is_valid_or_one_line(text: str) -> None:
     """Read, expanded and turned into data again."""

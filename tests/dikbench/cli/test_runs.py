@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 from makers.plugins import law_with
-from makers.runs import without_workers
+from makers.runs import without_figures, without_workers
 
 import dikbench
 from dikbench.cli import commands
@@ -24,8 +24,8 @@ RUN = ("run", "--scenario", "reach[duration=0.1]", "--plant", "ideal", "--traces
 
 
 def run(out: Path, *options: str) -> tuple[int, str, str]:
-    """Exit code, stdout and stderr of a run, whose trials run in this process."""
-    with without_workers():
+    """Exit code, stdout and stderr of a run in this process, whose report has no figures."""
+    with without_workers(), without_figures():
         result = CliRunner().invoke(commands, [*RUN, "--out", str(out), *options])
     return result.exit_code, result.stdout, result.stderr
 
@@ -52,9 +52,16 @@ def test_a_formulation_that_fails_at_once_is_exit_code_3(tmp_path: Path) -> None
 @pytest.mark.parametrize("way", [("--plant", "saturating"), ("--reference", "path")])
 def test_the_oracle_is_not_missing_for_ever(tmp_path: Path, way: tuple[str, str]) -> None:
     """It ran as it can; nothing of the plan is missing and no row is of an earlier run."""
-    options = (*RUN[:1], "--scenario", "speed-sweep[speed=0.5,laps=1]", *way, "--traces", "none")
+    options = (
+        *RUN[:1],
+        "--scenario",
+        "speed-sweep[speed=0.5,laps=1,dt=0.02]",
+        *way,
+        "--traces",
+        "none",
+    )
     names = ("--formulation", "oracle", "--formulation", "slowed-oracle", "--formulation", "dls")
-    with without_workers():
+    with without_workers(), without_figures():
         result = CliRunner().invoke(
             commands, [*options, *names, "--jobs", "1", "--out", str(tmp_path / "out")]
         )

@@ -154,7 +154,10 @@ def test_a_changed_study_adds_and_never_deletes(tmp_path: Path) -> None:
 
 
 def test_a_changed_law_is_run_again_and_its_old_row_is_not_shown(tmp_path: Path) -> None:
-    """A formulation is what its source says: another source is another trial."""
+    """A formulation is what its source says: another source is another trial.
+
+    Of two processes: this one, and one of its own.
+    """
     source = (
         "from dataclasses import dataclass\nimport numpy as np\n\n"
         "@dataclass(frozen=True)\nclass Still:\n    def velocity(self, problem, solve):\n"
@@ -164,11 +167,13 @@ def test_a_changed_law_is_run_again_and_its_old_row_is_not_shown(tmp_path: Path)
     study = msgspec.structs.replace(
         STUDY, cells=(Cells((f"{formulation}:Still",)),), scenarios=("reach[duration=0.1]",)
     )
-    command = script_of(study, tmp_path, 1)
-    speeds = []
+    speeds: list[list[float]] = []
     for value in (0.0, 1e-3):
         formulation.write_text(source.format(value))
-        subprocess.run(command, check=True, capture_output=True)
+        if speeds:
+            subprocess.run(script_of(study, tmp_path, 1), check=True, capture_output=True)
+        else:
+            run_here(study, tmp_path / "out", RunSettings(jobs=1), "a test")
         speeds.append(load_results(tmp_path / "out").trials["joint_travel_rad"].tolist())
     assert speeds[0] == [0.0]
     assert len(speeds[1]) == 1
@@ -368,10 +373,9 @@ def test_a_killed_run_continues_to_the_same_rows(undisturbed: Path, tmp_path: Pa
 
     (`tests/faults/kill.py` does it as often as one likes.)
     """
-    command = script_of(STUDY, tmp_path, 2)
-    for rows in (1, 3):
+    for rows, jobs in ((1, 2), (3, 1)):
         process = subprocess.Popen(
-            command,
+            script_of(STUDY, tmp_path, jobs),
             start_new_session=True,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,

@@ -301,21 +301,21 @@ def test_intervals_are_those_of_a_bootstrap_by_hand(folder: Path) -> None:
 
 
 def test_each_format_has_every_pair(folder: Path, tmp_path: Path) -> None:
-    """Text, Markdown and LaTeX have a row per pair; a file has what was printed."""
+    """Text, if not told, Markdown and LaTeX have a row per pair; a file has what was printed."""
     names = ("--formulation", "qp with daqp")
     pairs = pairs_of(folder, "qp with daqp")
     common = sum(pair["both"] not in ("", "0") for pair in pairs)
     marks = {"text": "  ", "markdown": "| ", "latex": " & "}
     for form, mark in marks.items():
         file = tmp_path / form
-        result = dikbench(folder, *names, "--format", form, "--out", file)
+        named = () if form == "text" else ("--format", form)
+        result = dikbench(folder, *names, *named, "--out", file)
         assert result.exit_code == 0
         assert file.read_text() == result.output
         lines = [line for line in result.output.splitlines() if mark in line]
         rows = [line for line in lines if "dls" in line or "pinv" in line or "osqp" in line]
         assert len(rows) == len(pairs) + common
         assert "Holm" in result.output
-    assert dikbench(folder, *names).output == (tmp_path / "text").read_text()
 
 
 @pytest.mark.parametrize(
