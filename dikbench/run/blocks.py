@@ -21,7 +21,7 @@ Engine = Literal["alone", "lockstep"]
 EngineChoice = Literal["auto", "alone", "lockstep"]
 
 LEAST_ROWS: Final = 64
-"""Lockstep pays from so many trials of one family, robot, plant and clock on."""
+"""Lockstep pays from so many trials of one family, robot and plant on."""
 
 MOST_SCENARIOS: Final = 128
 """Largest number of scenarios of a block ..."""
@@ -41,8 +41,10 @@ def engine_of(planned: Sequence[PlannedTrial], choice: EngineChoice, store: Stor
 
     Args:
         planned: its trials.
-        choice: the engine, or `auto`: lockstep where `LEAST_ROWS` trials, on average, of
-            formulations that answer many at once share family, robot, plant and clock.
+        choice: the engine, or `auto`: lockstep where the references move with the clock, and
+            `LEAST_ROWS` trials, on average, of formulations that answer many at once share family,
+            robot and plant. Where a reference waits, runs are of very different lengths, and the
+            last ones of a lockstep cost as much as all.
         store: of the results.
 
     Raises:
@@ -61,9 +63,12 @@ def engine_of(planned: Sequence[PlannedTrial], choice: EngineChoice, store: Stor
         return "lockstep" if there == "lockstep" else "alone"
     if choice != "auto":
         return choice
+    trials = [p.trial for p in planned if not p.skip]
+    if any(trial.reference != "time" for trial in trials):
+        return "alone"
     kinds = Counter(
-        (*_like(trial.scenario), trial.plant, trial.reference)
-        for trial in (p.trial for p in planned if not p.skip)
+        (*_like(trial.scenario), trial.plant)
+        for trial in trials
         if trial.formulation.name not in ORACLES and is_batched(make_formulation(trial.formulation))
     )
     return "lockstep" if kinds and kinds.total() / len(kinds) >= LEAST_ROWS else "alone"
