@@ -171,8 +171,9 @@ def test_a_run_that_is_stopped_goes_on_to_the_same_rows(
     )
 
 
-def test_the_engine_is_chosen_once(tmp_path: Path) -> None:
+def test_the_engine_is_chosen_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Many of a kind run in lockstep, a few alone; rows of both are not mixed."""
+    monkeypatch.setattr(blocks, "LEAST_ROWS", 5)
     few = msgspec.structs.replace(_study(["dls"], NEAR_MISSES[1:]), timing=None)
     many = msgspec.structs.replace(_study(["dls"]), seeds=tuple(range(5)), timing=None)
     for study, engine in ((few, "alone"), (many, "lockstep")):
