@@ -126,10 +126,11 @@ OTHER_WAYS = [*((law, None) for law in DAMPED), ("qp", "osqp"), ("qp", "piqp")]
 """Laws that are not damped by default, and solvers of other kinds than the default."""
 
 
-@pytest.mark.parametrize(("turn", "way"), [*enumerate(OTHER_WAYS)])
-def test_law_keeps_the_contract_in_other_ways(turn: int, way: tuple[str, str | None]) -> None:
+@pytest.mark.parametrize(
+    ("turn", "selector", "solver"), [(turn, *way) for turn, way in enumerate(OTHER_WAYS)]
+)
+def test_law_keeps_the_contract_in_other_ways(turn: int, selector: str, solver: str | None) -> None:
     """With damping, and through another solver; at one state in so many."""
-    selector, solver = way
     with few_states(turn):
         check_formulation(make_formulation(selector), solver)
 

@@ -14,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from makers.problems import KeepsProgram, kinematics_at, problem_at
+from makers.turns import in_turns
 
 from dikbench import DikAnswer, Robot, Status, load_robot, solve_dik
 from dikbench.arrays import Array
@@ -109,9 +110,9 @@ NO_REFERENCE = {
 }
 
 
-@pytest.mark.parametrize("acceleration", [False, True], ids=["", "acceleration"])
-@pytest.mark.parametrize("gain", [0, 1, 10])
-@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize(
+    ("name", "gain", "acceleration"), in_turns(ARMS, [0, 1, 10], [False, True])
+)
 def test_drakes_function(name: str, gain: int, acceleration: bool) -> None:
     """Velocity to 1e-4 rad/s and alpha to 1e-6 wherever Drake's answer is one.
 

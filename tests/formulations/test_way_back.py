@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from makers.problems import solve_for
+from makers.turns import in_turns
 
 from dikbench.arrays import Array
 from dikbench.plugins.building import make_formulation, make_scenario
@@ -45,22 +46,19 @@ def _held_outside(name: str, outside: Array) -> Scenario:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize(
-    ("robot", "outside"),
-    [
-        ("planar3r", np.array([0.0, 0.08, 0.0])),
-        ("panda", np.array([0, -0.1, 0, 0.08, 0, 0.002, 0])),
-    ],
-)
-def test_it_comes_back_and_no_step_breaks_an_acceleration_limit(
-    name: str, robot: str, outside: Array
-) -> None:
+OUTSIDE = {
+    "planar3r": np.array([0.0, 0.08, 0.0]),
+    "panda": np.array([0, -0.1, 0, 0.08, 0, 0.002, 0]),
+}
+
+
+@pytest.mark.parametrize(("name", "robot"), in_turns(NAMES, OUTSIDE))
+def test_it_comes_back_and_no_step_breaks_an_acceleration_limit(name: str, robot: str) -> None:
     """Though the task pulls outwards: inside within 1.2 s, never farther out, never too sudden.
 
     Libraries that brake too late before a limit break acceleration limits there, once inside.
     """
-    scenario = _held_outside(robot, outside)
+    scenario = _held_outside(robot, OUTSIDE[robot])
     formulation = make_formulation(name)
     solver = DEFAULT_SOLVER[program_of(formulation) or "qp"]
     trace = simulate(scenario, formulation, solve_for(formulation, solver), Ideal()).trace

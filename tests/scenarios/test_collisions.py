@@ -12,6 +12,7 @@ from types import MappingProxyType
 import numpy as np
 import pytest
 from makers.scenarios import run_of, scenario_error, scenario_of
+from makers.turns import in_turns
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
@@ -60,8 +61,7 @@ def test_a_law_that_does_not_look_runs_into_it(selector: str) -> None:
     assert _errors(run, scenario).max() < 5e-3
 
 
-@pytest.mark.parametrize("law", ["qp", "hqp", "lp-alpha"])
-@pytest.mark.parametrize("selector", CASES)
+@pytest.mark.parametrize(("selector", "law"), in_turns(CASES, ["qp", "hqp", "lp-alpha"], every=3))
 def test_distances_fall_below_the_margin_by_the_remainder_and_no_more(
     selector: str, law: str
 ) -> None:

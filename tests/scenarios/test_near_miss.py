@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from makers.scenarios import known_singularity, scenario_error, scenario_of
+from makers.turns import in_turns
 from makers.urdfs import SIX, write_arm
 
 from dikbench.arrays import Array
@@ -47,10 +48,12 @@ def _urdf(ending: str) -> str:
 # --- the path and its motion
 
 
-@pytest.mark.parametrize("miss", MISSES)
-@pytest.mark.parametrize(("robot", "name"), KNOWN)
-def test_the_path_misses_the_singular_placement_by_miss(robot: str, name: str, miss: float) -> None:
+@pytest.mark.parametrize(("known", "miss"), in_turns(KNOWN, MISSES))
+def test_the_path_misses_the_singular_placement_by_miss(
+    known: tuple[str, str], miss: float
+) -> None:
     """Half way, by a twist of that length; and nowhere is it nearer."""
+    robot, name = known
     scenario = scenario_of(_selector(robot, name, miss))
     X_s = known_singularity(robot, name)[1].placement
     reference = scenario.reference

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from makers.turns import in_turns
 
 from dikbench.plugins.building import make_scenario
 from dikbench.problem.constraints import CollisionConstraint
@@ -72,8 +73,7 @@ def _keeps_what_must_be_kept(scenario: Scenario) -> None:
         assert witness.motion.instants[-1] + witness.lateness <= end + 1e-9
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
-@pytest.mark.parametrize("selector", FOUND)
+@pytest.mark.parametrize(("selector", "seed"), in_turns(FOUND, [0, 1, 2], every=3))
 def test_a_motion_that_was_found_is_a_witness(selector: str, seed: int) -> None:
     """Inside all limits, clear, on the path, or at the target in time."""
     scenario = make_scenario(selector, seed)

@@ -13,6 +13,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 from makers.scenarios import RATE, Recording, at_step, exact, planar_scenario, raises, run_on_planar
+from makers.turns import in_turns
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError, Infeasible
@@ -230,19 +231,19 @@ def _same(a: Trace, b: Trace) -> None:
         assert np.array_equal(x, y, equal_nan=x.dtype.kind == "f"), field.name
 
 
-@pytest.mark.parametrize(
-    ("law", "solver"),
-    [
-        ("pinv[after=clip]", ""),
-        ("qp", "daqp"),
-        ("qp", "osqp"),
-        # ProxQP depends on where its memory is, in the last bit.
-        *(("qp", f"{name}[interface=warm]") for name in WORKSPACES if name != "proxqp"),
-    ],
+ALIKE = (
+    ("pinv[after=clip]", ""),
+    ("qp", "daqp"),
+    ("qp", "osqp"),
+    # ProxQP depends on where its memory is, in the last bit.
+    *(("qp", f"{name}[interface=warm]") for name in WORKSPACES if name != "proxqp"),
 )
-@pytest.mark.parametrize("mode", ["time", "path"])
-def test_the_same_run_gives_the_same_bits(law: str, solver: str, mode: Any) -> None:
+
+
+@pytest.mark.parametrize(("pair", "mode"), in_turns(ALIKE, ["time", "path"]))
+def test_the_same_run_gives_the_same_bits(pair: tuple[str, str], mode: Any) -> None:
     """With one scenario and one law used again, and with all of them made anew."""
+    law, solver = pair
 
     def once(scenario: Scenario) -> Trace:
         formulation = make_formulation(law)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from makers.turns import in_turns
 
 from dikbench.metrics import Outcome, judge, motion_of
 from dikbench.plugins.building import make_plant, make_scenario
@@ -22,8 +23,7 @@ SCENARIOS = (
 )
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
-@pytest.mark.parametrize("mode", ["time", "path"])
+@pytest.mark.parametrize(("name", "mode"), in_turns(SCENARIOS, ["time", "path"]))
 def test_the_slowed_oracle_does_what_can_be_done(name: str, mode: ReferenceMode) -> None:
     """By the clock where the exact motion keeps its limits, else late or recovered; all limits."""
     scenario = make_scenario(name)

@@ -25,7 +25,7 @@ pytestmark = pytest.mark.filterwarnings(r"ignore::UserWarning:qpsolvers\.")
 NAMES: Final = [name for name in WORKSPACES if is_installed(name)]
 LINEAR: Final = [name for name in NAMES if "lp" in BACK_ENDS[name].programs]
 
-STEPS: Final = 30
+STEPS: Final = 20
 
 LIBRARY_FAILURES: Final = 1
 """Programs of a test at which a library may fail when called cold: HiGHS and ProxQP do, rarely."""
