@@ -71,6 +71,12 @@ class Embedding:
         """Whether points are of targets only, and frames are placed beside them by `beside`."""
         return bool(self.turning) or self.turn is not None
 
+    def is_like(self, other: Embedding) -> bool:
+        """Say whether both map placements to the same points."""
+        parts = ((each.linear, each.left, each.right) for each in (self, other))
+        alike = all(map(np.array_equal, *parts))
+        return alike and (self.scale, self.of_one_turn) == (other.scale, other.of_one_turn)
+
     def points(self, rotations: Array, translations: Array) -> Array:
         """Map n placements to points, (n, d) [m].
 

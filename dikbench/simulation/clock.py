@@ -82,8 +82,7 @@ class PathClock:
         self.tau = 0.0
         self._dt, self._target = scenario.dt, scenario.target
         self._duration = scenario.reference.duration
-        longest = scenario.longest_path_run * self._duration
-        self.most_steps = max(1, round(longest / self._dt))
+        self.most_steps = most_path_steps(scenario)
         self._path, self._scenario = scenario.embedded_path, scenario
         self._frame, self._model = scenario.robot.frame_id, scenario.robot.model
         self._data = self._model.createData()
@@ -112,8 +111,14 @@ class PathClock:
         self.tau = min(ahead, self._duration)
 
 
-def path_has_ended(tau: float, duration: float) -> bool:
-    """Return whether a nominal time [s] is the end of a path of this nominal duration [s]."""
+def most_path_steps(scenario: Scenario) -> int:
+    """Return the largest number of control steps of a trial whose reference waits."""
+    longest = scenario.longest_path_run * scenario.reference.duration
+    return max(1, round(longest / scenario.dt))
+
+
+def path_has_ended(tau: Any, duration: Any) -> Any:
+    """Say whether a nominal time [s] is the end of a path of this nominal duration [s]; or each."""
     return tau >= duration * (1 - PATH_END_TOLERANCE)
 
 

@@ -49,13 +49,14 @@ def kind_of(scenario: Scenario) -> Hashable | None:
 
     It is the robot with its limits, the tracked rows, the kinds of its tasks, and dt. Scenarios
     with rows G v <= h, several tasks of one priority, tasks on other frames or of single angular
-    rows run alone.
+    rows run alone, and those whose distance from the path is by the task's error.
     """
     robot = scenario.robot
     tracking = kind_of_tracking(scenario.tracking, robot)
     others = [kind_of_task(task) for task in scenario.tasks]
     priorities = [scenario.tracking.priority, *(task.priority for task in scenario.tasks)]
-    if scenario.constraints or tracking is None or None in others:
+    by_error = scenario.embedding.by_error
+    if scenario.constraints or tracking is None or None in others or by_error:
         return None
     if len(set(priorities)) < len(priorities):
         return None

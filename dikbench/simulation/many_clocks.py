@@ -10,8 +10,15 @@ import numpy as np
 
 from dikbench.arrays import Array, Mask
 from dikbench.problem.tasks.many_tasks import ManyTargets
+from dikbench.robots.many_kinematics import ManyKinematics
+from dikbench.scenario.reference.many_paths import ManyPaths
 from dikbench.scenario.scenario import Scenario
-from dikbench.simulation.clock import PathClock, ReferenceMode, path_has_ended
+from dikbench.simulation.clock import (
+    LOOK_BACK_S,
+    ReferenceMode,
+    most_path_steps,
+    path_has_ended,
+)
 
 
 class ManyClocks(Protocol):
@@ -91,16 +98,26 @@ class ManyPathClocks:
     """Wait for the robots, each for its own (see `PathClock`)."""
 
     def __init__(self, scenarios: Sequence[Scenario]) -> None:
-        self._clocks = [PathClock(scenario) for scenario in scenarios]
-        self._scenarios = list(scenarios)
-        self.most_steps: Sequence[int] = [clock.most_steps for clock in self._clocks]
-        self._step = 0
+        paths = [scenario.embedded_path for scenario in scenarios]
+        found = [path for path in paths if path is not None]
+        assert len(found) == len(paths)
+        self._scenarios, self._dt = list(scenarios), scenarios[0].dt
+        self.most_steps: Sequence[int] = [most_path_steps(scenario) for scenario in scenarios]
+        self._left = np.array(self.most_steps)
+        self._durations = np.array([scenario.reference.duration for scenario in scenarios])
+        self._step, self._tau = 0, np.zeros(len(scenarios))
+        self._rows = np.arange(len(scenarios))
+        self._paths = ManyPaths(found, LOOK_BACK_S + 2 * self._dt)
+        self._kinematics = ManyKinematics(scenarios[0].robot)
+        self._alike = all(
+            scenario.embedding.is_like(scenarios[0].embedding) for scenario in scenarios
+        )
 
     def targets(self) -> ManyTargets:
         """See `ManyClocks`."""
         pairs = [
-            scenario.target(clock.tau)
-            for scenario, clock in zip(self._scenarios, self._clocks, strict=True)
+            scenario.target(tau)
+            for scenario, tau in zip(self._scenarios, self._tau.tolist(), strict=True)
         ]
         return ManyTargets(
             np.array([X.rotation for X, _ in pairs]),
@@ -110,30 +127,34 @@ class ManyPathClocks:
 
     def tau(self) -> Array:
         """See `ManyClocks`."""
-        return np.array([clock.tau for clock in self._clocks])
+        return self._tau
 
     def advance(self, q: Array) -> None:
         """See `ManyClocks`."""
         self._step += 1
-        for clock, row in zip(self._clocks, q, strict=True):
-            clock.advance(row)
+        self._kinematics.update(q)
+        R, p = self._kinematics.rotations, self._kinematics.translations
+        if self._alike:
+            points = self._scenarios[0].embedding.points(R, p)
+        else:  # what is asked for is in the axes of each target
+            each = zip(self._scenarios, R[:, None], p[:, None], strict=True)
+            points = np.concatenate([s.embedding.points(*placed) for s, *placed in each])
+        tau, dt, durations = self._tau, self._dt, self._durations
+        first, last = np.maximum(tau - LOOK_BACK_S, 0.0), np.minimum(tau + 2 * dt, durations)
+        near = self._paths.latest_nearest(self._rows, points, first, last)
+        ahead = np.minimum(tau + dt, np.maximum(tau, near + dt))
+        self._tau = np.minimum(ahead, durations)
 
     def over(self) -> Mask:
         """See `ManyClocks`."""
-        return np.array(
-            [
-                self._step >= clock.most_steps
-                or path_has_ended(clock.tau, scenario.reference.duration)
-                for scenario, clock in zip(self._scenarios, self._clocks, strict=True)
-            ],
-            dtype=bool,
-        )
+        over: Mask = (self._left <= self._step) | path_has_ended(self._tau, self._durations)
+        return over
 
     def keep(self, kept: Mask) -> None:
         """See `ManyClocks`."""
-        rows = np.flatnonzero(kept).tolist()
-        self._clocks = [self._clocks[row] for row in rows]
-        self._scenarios = [self._scenarios[row] for row in rows]
+        self._scenarios = [self._scenarios[row] for row in np.flatnonzero(kept).tolist()]
+        self._rows, self._tau, self._left = self._rows[kept], self._tau[kept], self._left[kept]
+        self._durations = self._durations[kept]
 
 
 MANY_CLOCKS: Final[Mapping[ReferenceMode, type[ManyClocks]]] = MappingProxyType(

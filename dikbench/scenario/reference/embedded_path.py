@@ -156,7 +156,7 @@ class EmbeddedPath:
         end = min(int(times.searchsorted(last)), len(times) - 1)
         start = min(max(int(times.searchsorted(first, side="right")) - 1, 0), end - 1)
         along, away = self.pieces[start:end], point - self.points[start:end]
-        scale, offset = self._to_shares
+        scale, offset = self.to_shares
         share = np.einsum("ij,ij->i", away, along) * scale[start:end] + offset[start:end]
         np.minimum(np.maximum(share, 0.0, out=share), 1.0, out=share)
         share[0] = max(share[0], (first - times[start]) / (times[start + 1] - times[start]))
@@ -168,7 +168,7 @@ class EmbeddedPath:
         return float(times[latest] + share[latest - start] * (times[latest + 1] - times[latest]))
 
     @cached_property
-    def _to_shares(self) -> tuple[Array, Array]:
+    def to_shares(self) -> tuple[Array, Array]:
         """The factor and the summand that make shares of products with the pieces, (f - 1,) each.
 
         The foot on a piece without length is its end.
