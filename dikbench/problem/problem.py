@@ -11,6 +11,7 @@ import msgspec
 import numpy as np
 
 from dikbench.arrays import Array, Indices
+from dikbench.errors import DikbenchError, in_words
 from dikbench.problem.tasks.task import LinearizedJointTask, LinearizedTask, stacked
 from dikbench.problem.velocity_box import Box, Braking, velocity_box
 from dikbench.programs.modelled_program import ModelledProgram
@@ -146,8 +147,19 @@ def promises_of(formulation: Formulation) -> frozenset[LimitKind]:
 
 
 def is_batched(formulation: Formulation) -> bool:
-    """Return whether the formulation answers many control steps at once."""
-    return bool(getattr(formulation, "batched", False))
+    """Return whether the formulation answers many control steps at once.
+
+    Raises:
+        DikbenchError: if what it says of it raises, or is not true or false.
+    """
+    name = type(formulation).__qualname__
+    try:
+        batched = getattr(formulation, "batched", False)
+    except Exception as error:
+        raise DikbenchError(f"class {name}: batched raised {in_words(error)}") from error
+    if not isinstance(batched, bool):
+        raise DikbenchError(f"class {name}: batched is {batched!r}; valid: True or False")
+    return batched
 
 
 def sight_of(formulation: Formulation) -> frozenset[ProblemPart]:

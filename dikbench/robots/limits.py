@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from dikbench.arrays import Array, Indices
+from dikbench.arrays import Array, Indices, read_only
 from dikbench.errors import DikbenchError
 
 NO_LIMIT_MAGNITUDE = 1e20
@@ -169,8 +169,8 @@ class JointLimits:
         return middle
 
     def at(self, q: Array) -> Limits:
-        """Return the limits as seen from configuration q (nq,)."""
-        return Limits(self, None if self.position is None else q[self.q_index])
+        """Return the limits as seen from configuration q (nq,); the plant's limits are these."""
+        return Limits(self, None if self.position is None else read_only(q[self.q_index]))
 
 
 class Limits(msgspec.Struct, eq=False):

@@ -35,8 +35,12 @@ from dikbench.simulation.status import Status
 from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER
 from dikbench.study.trial import Trial
 
-MOST_ROWS: Final = 1024
+MOST_ROWS: Final = 512
 """So many trials are in lockstep at most: more are hardly faster, and need their memory."""
+
+
+class BlockEnded(Exception):
+    """Something of a block could not be run in lockstep."""
 
 
 def work_together(
@@ -56,10 +60,17 @@ def work_together(
 
     Raises:
         CannotStore: if a trace cannot be written.
+        BlockEnded: if a formulation ends the lockstep of several trials.
     """
     restore_process()
     cells = list(dict.fromkeys((trial.scenario, trial.seed) for trial in trials))
-    built = dict(zip(cells, make_scenarios(cells), strict=True))
+    built: dict[tuple[Selector, int], Scenario | BaseException]
+    try:
+        built = dict(zip(cells, make_scenarios(cells), strict=True))
+    except KeyboardInterrupt as error:  # a plug-in's own
+        if len(trials) > 1:
+            raise BlockEnded(f"{type(error).__name__}: {error}") from None
+        built = {cells[0]: error}
     rows: dict[int, TrialRow] = {}
     alone: list[tuple[int, Prepared]] = []
     groups: dict[object, list[tuple[int, Prepared]]] = {}
@@ -79,8 +90,10 @@ def work_together(
             part = group[start : start + MOST_ROWS]
             try:
                 found_runs = _in_lockstep([ready for _, ready in part])
-            except Exception:  # each trial then says what is wrong of it
-                alone += part
+            except BaseException as error:
+                if len(trials) > 1:  # who it was is found out in smaller blocks
+                    raise BlockEnded(f"{type(error).__name__}: {error}") from None
+                alone += part  # which says what is wrong of it
                 continue
             together += [(*each, run) for each, run in zip(part, found_runs, strict=True)]
     made = rows_of(  # those of one scenario are measured together
@@ -119,7 +132,8 @@ def _kind(ready: Prepared) -> object | None:
     if trial.formulation.name in ORACLES or not is_batched(ready.formulation):
         return None
     kind = kind_of(ready.scenario)
-    if kind is None:
+    # A solver that starts from its last answer must be asked once a step, whatever comes of it.
+    if kind is None or "interface=warm" in str(trial.solver):
         return None
     return kind, trial.plant, trial.reference
 
@@ -142,5 +156,5 @@ def _in_lockstep(ready: Sequence[Prepared]) -> list[LockstepRun]:
 
 @lru_cache(maxsize=256)
 def _guesses(solver: Selector) -> bool:
-    """Say whether minimisers may be guessed: where solvers are compared, each is asked always."""
+    """Say whether minimisers may be guessed: for the default solver; another is asked always."""
     return any(solver == parse_selector(default) for default in DEFAULT_SOLVER.values())

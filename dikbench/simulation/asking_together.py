@@ -56,24 +56,30 @@ class AskedTogether:
             problem: the problems of its rows.
 
         Returns:
-            Velocities (n, nv), and which rows have to be asked alone, (n,).
+            Velocities (n, nv), and which rows have to be asked alone, (n,); `relaxed` of the
+            problem is recorded.
         """
         shape = len(self.solves), problem.robot.nv
         self.rechecked = None
         if not self._batched:
             return np.full(shape, np.nan), np.ones(len(self.solves), dtype=bool)
         finite = _finite_rows(problem)
-        v = self._together(problem, self.solves)
+        own = part_of(problem, slice(None))  # a formulation may change what it is handed
+        v = self._together(own, self.solves)
         if v is not None:
+            problem.relaxed = own.relaxed
             self.rechecked = None if self._many is None else self._many.rechecked
             return v, _unanswered(v) | ~finite
         v, records = np.full(shape, np.nan), RecheckedSteps(len(self.solves))
+        relaxed = np.zeros(len(self.solves), dtype=int)
         for row in np.flatnonzero(finite).tolist():
-            one = self._together(part_of(problem, slice(row, row + 1)), self.solves[row : row + 1])
+            own = part_of(problem, slice(row, row + 1))
+            one = self._together(own, self.solves[row : row + 1])
             if one is not None:
-                v[row] = one[0]
+                v[row], relaxed[row] = one[0], np.ravel(own.relaxed)[0]
                 if self._many is not None:
                     _copy(self._many.rechecked, records, row)
+        problem.relaxed = relaxed
         self.rechecked = None if self._many is None else records
         return v, _unanswered(v)
 
@@ -82,14 +88,18 @@ class AskedTogether:
         if self._many is not None:
             self._many.begin_step(solves)
         try:
-            answer: Any = self.formulation.velocity(problem, self._many or NoSolve())
+            with np.errstate():  # what it sets is not for others
+                answer: Any = self.formulation.velocity(problem, self._many or NoSolve())
         except MemoryError:
             raise
         except Exception:
             return None
         shape = len(solves), problem.robot.nv
-        fits = isinstance(answer, np.ndarray) and answer.shape == shape
-        return answer if fits and answer.dtype == float else None
+        fits = type(answer) is np.ndarray and answer.shape == shape and answer.dtype == float
+        counted = np.shape(problem.relaxed) in ((), (len(solves),))
+        return (
+            answer if fits and counted and np.asarray(problem.relaxed).dtype.kind == "i" else None
+        )
 
 
 def part_of(problem: DikProblem, rows: slice) -> DikProblem:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from dikbench.arrays import Array, Indices, Mask
+from dikbench.arrays import Array, Indices, Mask, read_only
 from dikbench.problem.problem import DikProblem, Formulation
 from dikbench.problem.tasks.many_tasks import (
     ManyTargets,
@@ -60,14 +60,12 @@ def kind_of(scenario: Scenario) -> Hashable | None:
         return None
     if len(set(priorities)) < len(priorities):
         return None
-    return (
-        id(robot.model),
-        robot.frame_id,
-        _limits_key(robot.limits),
-        tracking,
-        *others,
-        scenario.dt,
-    )
+    known = robot.available_acceleration
+    own = (
+        id(robot.model), robot.name, robot.frame_id, robot.q0.tobytes(), robot.urdf, robot.srdf,
+        robot.movable_rows, None if known is None else known.tobytes(), _limits_key(robot.limits),
+    )  # fmt: skip
+    return own, tracking, *others, scenario.dt
 
 
 def _limits_key(limits: JointLimits) -> Hashable:
@@ -126,9 +124,9 @@ def simulate_together(
     return [found[k] for k in range(len(trials))]
 
 
-def _asked_as_one(trial: LockstepTrial) -> tuple[int, bool]:
+def _asked_as_one(trial: LockstepTrial) -> tuple[int, bool, float]:
     """Return what trials share that are asked together."""
-    return id(trial.formulation), trial.guesses
+    return id(trial.formulation), trial.guesses, trial.solve.tolerance
 
 
 class _Lockstep:
@@ -183,7 +181,8 @@ class _Lockstep:
             trial = self.trials[running[row]]
             self.records.asked_alone[running[row]] += 1
             try:
-                answer = control_step(trial.formulation, own, trial.solve, k)
+                with np.errstate():  # what it sets is not for others
+                    answer = control_step(trial.formulation, own, trial.solve, k)
             except TrialEnded as ended:
                 out[row] = True
                 self.records.ended[int(running[row])] = ended.status, f"step {k}: {ended}"
@@ -289,5 +288,5 @@ class _Lockstep:
 
 
 def _coordinates(limits: JointLimits, q: Array) -> Array | None:
-    """Return what position limits bound of configurations (N, nq), (N, nv)."""
-    return None if limits.position is None else q[:, limits.q_index]
+    """Return what position limits bound of configurations (N, nq), (N, nv), read-only."""
+    return None if limits.position is None else read_only(q[:, limits.q_index])

@@ -100,7 +100,17 @@ def linearize_tracking(
             )
             J = np.concatenate([product3(R, J[:, :3]), product3(R, J[:, 3:])], axis=1)
     error, V, J = error[:, rows], V[:, rows], J[:, rows]
-    return LinearizedTask(J, task.gain * error + V, error, task.weight, task.priority)
+    kind = LinearizedTask if isinstance(task, PositionTask) else LinearizedTurns
+    return kind(J, task.gain * error + V, error, task.weight, task.priority)
+
+
+class LinearizedTurns(LinearizedTask, eq=False):
+    """Tasks on orientations at many configurations."""
+
+    @property
+    def log_derivative(self) -> Array | None:
+        """Refuse: it is computed for one placement, so that each row has to be asked alone."""
+        raise NotImplementedError("the derivative of the logarithm is not computed for many")
 
 
 def _turns(task: Any, robot: Robot) -> bool:

@@ -46,6 +46,7 @@ NOT_COMPARED = {"wall_time_s", "control_time_s", "described", "asked_alone_steps
 HOSTILE = '''
 import os
 from dataclasses import dataclass
+import numpy as np
 from dikbench.problem import least_norm
 
 @dataclass(frozen=True)
@@ -60,6 +61,18 @@ class Hostile:
             os._exit(3)
         if self.how == "raise":
             raise RuntimeError("no")
+        if self.how == "sys.exit":
+            raise SystemExit(0)
+        if self.how == "interrupt":
+            raise KeyboardInterrupt
+        if self.how == "memory for many" and problem.q.ndim == 2:
+            raise MemoryError
+        if self.how == "changes the problem":
+            problem.relaxed = "x"
+        if self.how == "sets errors":
+            np.seterr(all="raise")
+        if self.how == "underflows":
+            np.array([1e-200]) ** 2
         return least_norm(problem.primary.J, problem.primary.V, 1e-6)
 '''
 
@@ -137,6 +150,38 @@ def test_a_run_is_the_same_with_one_worker_and_with_two(tmp_path: Path) -> None:
             assert row["message"].startswith("step 0: RuntimeError: no")
         else:
             assert row["status"] in ("ok", "skipped"), row
+
+
+HOWS = {
+    "sys.exit": ("crashed", "SystemExit"),
+    "interrupt": ("crashed", "KeyboardInterrupt"),
+    "memory for many": ("ok", ""),
+    "changes the problem": ("formulation-error", ""),
+    "sets errors": ("ok", ""),
+    "underflows": ("ok", ""),
+}
+"""What formulations do, and how their trials end."""
+
+
+def test_what_a_formulation_does_changes_no_bit_of_others(tmp_path: Path) -> None:
+    """It ends its own trials only, as alone, whatever it raises and wherever."""
+    (tmp_path / "hostile.py").write_text(HOSTILE)
+    hostile = [f"{tmp_path}/hostile.py:Hostile[how='{how}']" for how in HOWS]
+    scenarios = NEAR_MISSES[1:]
+    with without_workers():
+        apart = _rows(_study(["dls", "qp"], scenarios), tmp_path / "apart", "lockstep")
+        beside = _rows(_study(["dls", *hostile, "qp"], scenarios), tmp_path / "beside", "lockstep")
+    assert apart.keys() <= beside.keys()
+    for trial, row in beside.items():
+        if trial in apart:
+            compared = row.keys() - NOT_COMPARED
+            assert {name: str(row[name]) for name in compared} == {
+                name: str(apart[trial][name]) for name in compared
+            }
+            continue
+        status, words = HOWS[row["formulation"].partition("how=")[2].strip("]'")]
+        assert row["status"] in (status, "skipped")
+        assert words in row["message"]
 
 
 def test_a_run_that_is_stopped_goes_on_to_the_same_rows(

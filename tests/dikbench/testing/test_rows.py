@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from dikbench.arrays import Array
+from dikbench.errors import DikbenchError, Infeasible
 from dikbench.problem import DikProblem, Solve, least_norm, times, transposed
 from dikbench.testing.rows import check_rows
 from dikbench.testing.straw import STRAW_LAWS
@@ -79,6 +80,34 @@ class Writes(OneForAll):
         return times(transposed(problem.primary.J), V)
 
 
+@dataclass(frozen=True)
+class Clips(OneForAll):
+    """Has no answer alone where it has one for rows."""
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        """J^T V, inside the limits."""
+        v = times(transposed(problem.primary.J), problem.primary.V)
+        if v.ndim == 1 and np.abs(v).max() > 0.1:
+            raise Infeasible("too fast")
+        return v
+
+
+@dataclass(frozen=True)
+class Raises(OneForAll):
+    """Does not say whether it is batched."""
+
+    @property
+    def batched(self) -> bool:  # type: ignore[override]
+        """Raise."""
+        raise RuntimeError("no idea")
+
+
+def test_what_does_not_say_whether_it_is_batched_is_an_error() -> None:
+    """In one line, with its class."""
+    with pytest.raises(DikbenchError, match=r"class Raises: batched raised RuntimeError: no idea"):
+        check_rows(Raises())
+
+
 @pytest.mark.parametrize(
     ("formulation", "words"),
     [
@@ -88,6 +117,7 @@ class Writes(OneForAll):
         (OneRow(), "expected"),
         (Never(), "answered no row"),
         (Writes(), "read-only"),
+        (Clips(), "give NaN where there is no answer"),
     ],
     ids=lambda value: type(value).__name__ if not isinstance(value, str) else "",
 )
