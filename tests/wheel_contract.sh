@@ -22,7 +22,7 @@ for package in (dikbench, formulations, scenarios):
 assert (Path(formulations.__file__).parent / "REFERENCES.md").is_file()
 PY
 venv/bin/dikbench list
-venv/bin/pytest --import-mode=importlib test_contract.py
+venv/bin/pytest --import-mode=importlib -o 'markers=long: takes minutes' -m 'not long' test_contract.py
 venv/bin/dikbench run smoke --scenario reach --out runs/wheel > /dev/null
 test -s runs/wheel/report.md
 test -s runs/wheel/report.html

@@ -71,10 +71,7 @@ def control_step(
     except Exception as error:
         raise TrialEnded(Status.FORMULATION_ERROR, in_words(error)) from error
     formulation_ns = perf_counter_ns() - start - solve.checking_ns
-    if type(v) is not np.ndarray or v.shape != (problem.robot.nv,) or v.dtype is not FLOATS:
-        _check_velocity(v, problem.robot.nv)
-        v = np.array(v, dtype=float)
-    return StepAnswer(v, Status.OK, formulation_ns, _square(v))
+    return StepAnswer(v, Status.OK, formulation_ns, _square(v, problem.robot.nv))
 
 
 def _check_finite(problem: DikProblem) -> None:
@@ -104,12 +101,14 @@ def _check_finite(problem: DikProblem) -> None:
         )
 
 
-def _square(v: Array) -> float:
-    """Check that the velocity of a formulation is finite and compute v^T v."""
-    square: float = v.dot(v)
+def _square(v: object, nv: int) -> float:
+    """Check the velocity of a formulation and compute v^T v."""
+    if type(v) is not np.ndarray or v.shape != (nv,) or v.dtype is not FLOATS:
+        _check_velocity(v, nv)
+    square: float = v.dot(v)  # type: ignore[attr-defined]
     # The product is finite if the entries are, which takes a third of checking every entry.
-    if not square < np.inf and not np.isfinite(v).all():
-        raise TrialEnded(Status.NOT_FINITE, f"velocity {v.tolist()}")
+    if not square < np.inf and not np.isfinite(v).all():  # type: ignore[call-overload]
+        raise TrialEnded(Status.NOT_FINITE, f"velocity {v.tolist()}")  # type: ignore[attr-defined]
     return square
 
 
