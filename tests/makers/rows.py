@@ -49,6 +49,7 @@ FAULTLESS: Final[Values] = {
     "verified_share": float("nan"),
     "disagreed_share": float("nan"),
     **dict.fromkeys(SEES, float("nan")),
+    "asked_alone_steps": float("nan"),
     "wall_time_s": 0.1,
     "control_time_s": 0.05,
     "environment": "e",

@@ -30,6 +30,8 @@ def test_each_limitation_is_said_where_it_applies_and_only_there() -> None:
             "message": "it cannot",
         },
         "`a`: in up to 20 % of a run's steps.": {"not_verified_share": [0.2, 0.0]},
+        "2 trials ran in lockstep": {"asked_alone_steps": 0.0, "wall_time_s": float("nan")},
+        "workers' time in trials that ran alone": {"asked_alone_steps": [0.0, float("nan")]},
         "without a feasible point": {"infeasible_share": 0.2},
         "Feasible programs without an answer": {"solver_failed_share": 0.2},
         "Acceleration bounds that were given up": {"relaxed_share": 0.2},
