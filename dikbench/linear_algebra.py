@@ -15,7 +15,6 @@ from typing import Any, Literal
 
 import numpy as np
 from scipy.linalg.lapack import dgeqrf, dgesdd, dpocon, dposv
-from scipy.optimize import nnls
 
 from dikbench.arrays import Array, Mask
 
@@ -32,13 +31,6 @@ singular values of a matrix take ten times as long."""
 
 REGULAR = 1e-14
 """Reciprocal condition from which on a matrix counts as regular."""
-
-NO_ROW = 1e-12
-"""Length up to which the row of an inequality bounds nothing."""
-
-INCONSISTENT = 1e-8
-"""Inequalities of rows of about unit length that can only be met to more than this contradict each
-other."""
 
 
 def thin_svd(A: Array) -> tuple[Array, Array, Array]:
@@ -345,29 +337,3 @@ def volume(A: Array) -> float | Array:
         return volumes
     R, _, _, _ = dgeqrf(A.T)
     return float(abs(R.diagonal().prod()))
-
-
-def shortest(G: Array, h: Array) -> Array | None:
-    """The shortest x (n,) with G x <= h, for G (p, n), h (p,); None where there is none.
-
-    With the rows scaled to unit length, u >= 0 the least-squares solution of
-    [-G^T; -h^T] u = (0, ..., 0, 1) and r what is left of it, x_j = -r_j / r_(n+1); r = 0 where no x
-    does it.
-
-    Source: Lawson & Hanson (1974), Solving Least Squares Problems, chapter 23.
-    """
-    n, size = G.shape[1], np.linalg.norm(G, axis=1)
-    rows = size > NO_ROW
-    if not rows.any():  # which scipy's solver does not survive
-        return np.zeros(n) if h.min(initial=0.0) >= -INCONSISTENT else None
-    E, f = -np.vstack([G[rows].T, h[rows]]) / size[rows], np.zeros(n + 1)
-    f[n] = 1.0
-    try:
-        u, _ = nnls(E, f)
-    except RuntimeError:  # it counts its iterations
-        return None
-    left = E @ u - f
-    if -left[n] < INCONSISTENT:
-        return None
-    x: Array = -left[:n] / left[n]
-    return x if (G @ x - h).max(initial=0.0) <= INCONSISTENT else None

@@ -39,6 +39,8 @@ def _in_still_steps(steps: Array, targets: Array) -> int:
         steps: displacements of the joints [rad or m].
         targets: before each step and after the last one, (k + 1, d) [m].
     """
+    if np.linalg.norm(np.ptp(targets, axis=0)) <= TARGET_MOVED_M:
+        return 0  # as in the rest at the end of a run
     events, first, counted = 0, 0, False
     way = np.zeros(steps.shape[1])
     for k, step in enumerate(steps, start=1):

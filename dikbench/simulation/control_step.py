@@ -10,7 +10,7 @@ import numpy as np
 
 from dikbench.arrays import Array
 from dikbench.errors import CannotAnswer, Infeasible, in_words
-from dikbench.linear_algebra import shortest
+from dikbench.linear_inequalities import shortest
 from dikbench.problem.problem import DikProblem, Formulation
 from dikbench.problem.velocity_box import velocity_box
 from dikbench.simulation.status import Status

@@ -19,7 +19,7 @@ from makers.scenarios import RATE, at_step, exact, planar_scenario, raises, run_
 
 from dikbench.arrays import Array
 from dikbench.errors import Infeasible, SolverFailed
-from dikbench.linear_algebra import shortest
+from dikbench.linear_inequalities import shortest
 from dikbench.metrics import motion_of
 from dikbench.plugins.building import make_formulation, make_plant, make_scenario
 from dikbench.problem import DikProblem, Solve
