@@ -11,7 +11,9 @@ import pytest
 
 CHECKOUT: Final = Path(__file__).parents[2]
 
-FIRST_LEVEL: Final = ("arrays", "errors", "linear_algebra", "parameters", "selector")
+FIRST_LEVEL: Final = (
+    "arrays", "errors", "linear_algebra", "linear_inequalities", "parameters", "selector",
+)  # fmt: skip
 """Modules beside the rooms, the lowest floor."""
 
 ROOMS: Final = (
