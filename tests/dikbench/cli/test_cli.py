@@ -441,6 +441,8 @@ def test_ctrl_c_keeps_what_is_finished_and_says_how_to_go_on(tmp_path: Path) -> 
         stdout=subprocess.DEVNULL,
         text=True,
         cwd=tmp_path,
+        # A shell starts what is in the background deaf to Ctrl-C, which children inherit.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
     store = tmp_path / "out" / "results.sqlite"
     for _ in range(600):
