@@ -1,7 +1,8 @@
 """Selectors: `name`, `name[parameter=value,...]` or `path/to/file.py:Class[...]`.
 
 Where a study or the command line selects, a value may be a list, `value|value`; several lists make
-a product. A name or a value with one of the characters `,|[]` in it stands in quotes.
+a product. A name or a value with one of the characters `,|[]` in it stands in quotes. `name[tuned]`
+is a formulation at its tuned parameters.
 """
 
 from __future__ import annotations
@@ -11,8 +12,12 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Final
 
 from dikbench.errors import DikbenchError
+
+TUNED: Final = "tuned"
+"""The word in a formulation's brackets that stands for its tuned parameters."""
 
 _QUOTED = re.compile(r"""'[^']*'|"[^"]*\"""")
 _FORM = re.compile(r"(?P<name>[^\[\]\s][^\[\]]*?)(\[(?P<parameters>[^\[\]]*)\])?")
@@ -93,6 +98,8 @@ def _parts(text: str) -> tuple[str, dict[str, str]]:
     inside = text[slice(*match.span("parameters"))] if match["parameters"] else ""
     for item in _split(inside, ",") if inside.strip() else ():
         key, equals, value = (part.strip() for part in item.partition("="))
+        if (key, equals) == (TUNED, ""):
+            equals, value = "=", "true"
         if not equals or not key or not _unquoted(value):
             raise DikbenchError(f"selector {given!r}: {item.strip()!r} is not parameter=value")
         if key in parameters:

@@ -41,7 +41,7 @@ class SelectiveDamping(Parameters):
     Source: [BussKim2005].
     """
 
-    max_rate: Annotated[float, Range(above=0.0, unit="rad/s"), Drawn(0.3, 6.0, log=True)] = 2.0
+    max_rate: Annotated[float, Range(above=0.0, unit="rad/s"), Drawn(0.3, 30.0, log=True)] = 2.0
     clamp: Literal["hard", "soft"] = "hard"
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:

@@ -14,6 +14,7 @@ import click
 from dikbench.cli.checking import check
 from dikbench.cli.one_line_errors import one_line_errors
 from dikbench.cli.reading_commands import compare, replay, table
+from dikbench.cli.tuning_command import tune
 
 EXIT_CODE_OF_STANDSTILL = 3
 """Exit code of a run in which no trial of a formulation took a step."""
@@ -315,3 +316,4 @@ commands.add_command(check)
 commands.add_command(compare)
 commands.add_command(replay)
 commands.add_command(table)
+commands.add_command(tune)

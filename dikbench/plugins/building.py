@@ -12,6 +12,7 @@ from dikbench.errors import DikbenchError, in_words, unknown
 from dikbench.parameters import Parameter, check_parameters, parameters_of
 from dikbench.plugins.finding import formulation_plugin, scenario_plugin
 from dikbench.plugins.time_limit import time_limit
+from dikbench.plugins.tuned import with_tuned
 from dikbench.problem.problem import Formulation
 from dikbench.scenario.certificate import CertificateFailed
 from dikbench.scenario.family import Family
@@ -30,9 +31,10 @@ def make_formulation(text: str | Selector) -> Formulation:
     """Build a formulation from `name[parameter=value,...]` or `path/to/file.py:Class[...]`.
 
     Raises:
-        DikbenchError: on an unknown name, file, class or parameter, or a value out of range.
+        DikbenchError: on an unknown name, file, class or parameter, a value out of range, or
+            `[tuned]` where nothing is tuned.
     """
-    selector = parse_selector(text)
+    selector = with_tuned(parse_selector(text))
     plugin = formulation_plugin(selector.name)
     make: Callable[..., Formulation] = partial(plugin.factory, **plugin.defaults)
     return _built(f"formulation {plugin.name}", make, plugin.parameters, selector)
@@ -121,14 +123,17 @@ def in_declared_order(
 ) -> Selector:
     """Parse a selector and put its parameters in the order in which its class declares them.
 
-    Selectors that differ in the order only become the same text. A selector that names nothing
-    valid is returned unchanged; building from it gives the error.
+    Selectors that differ in the order only become the same text, and `[tuned]` the parameters for
+    which it stands. A selector that names nothing valid is returned unchanged; building from it
+    gives the error.
 
     Raises:
         DikbenchError: if the text is no selector.
     """
     selector = parse_selector(text)
     try:
+        if kind == "formulation":
+            selector = with_tuned(selector)
         if kind == "plant":
             return selector.ordered(parameters_of(PLANTS[selector.name]))
         find = formulation_plugin if kind == "formulation" else scenario_plugin

@@ -115,7 +115,7 @@ class Rates:
 
 
 def rates(
-    trials: pd.DataFrame, done: Mask, candidates: Collection[Contender] | None = None
+    trials: pd.DataFrame, done: Mask | Array, candidates: Collection[Contender] | None = None
 ) -> Rates:
     """Compute the rates of success of every formulation, and compare each with the best.
 
@@ -124,7 +124,7 @@ def rates(
 
     Args:
         trials: rows that count (see `counted`).
-        done: whether the robot did its job in each.
+        done: whether the robot did its job in each, or how well (0 to 1).
         candidates: who competes; default: everybody that can. Where none of them can, the rates
             are compared with the best of all, and nobody is `best`.
     """

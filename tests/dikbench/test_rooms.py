@@ -31,6 +31,7 @@ ROOMS: Final = (
     "results",
     "run",
     "report",
+    "tuning",
     "invariants",
     "viewer",
     "cli",

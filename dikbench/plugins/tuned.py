@@ -1,0 +1,101 @@
+"""The tuned parameters of formulations: `tuned.toml` in the folder of their file.
+
+`dikbench tune --freeze` writes it, and the selector `name[tuned]` reads it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from dikbench.errors import DikbenchError
+from dikbench.plugins.finding import formulation_plugin
+from dikbench.selector import TUNED, Selector
+
+FILE: Final = "tuned.toml"
+
+DIGITS: Final = 4
+"""Significant digits of a tuned or drawn number, so that its text is exact."""
+
+
+class Tuned(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The tuned parameters of a formulation, and how they were found.
+
+    Attributes:
+        parameters: the values found; empty where nothing tried was better than the defaults.
+        study, seed, budget: the study of the train split, the seed of the points, their number.
+        digest: hash of the trials of the study, with the sources of formulation and scenarios.
+        success, default_success: mean rate of success on that study, tuned and at the defaults.
+    """
+
+    parameters: dict[str, float]
+    study: str
+    seed: int
+    budget: int
+    digest: str
+    success: float
+    default_success: float
+
+
+def key_of(selector: Selector) -> str:
+    """Return the name of a formulation in the file: its selector, a path's class only."""
+    plugin = formulation_plugin(selector.name)
+    name = selector.name.rpartition(":")[2]
+    return str(Selector(name, selector.parameters).ordered(plugin.parameters))
+
+
+def file_for(selector: Selector) -> Path:
+    """Return the file with the tuned parameters of a formulation, which need not exist."""
+    return Path(formulation_plugin(selector.name).file).with_name(FILE)
+
+
+def read_tuned(file: Path) -> Mapping[str, Tuned]:
+    """Read a file of tuned parameters, by formulation; a missing one is empty.
+
+    Raises:
+        DikbenchError: if it cannot be read, or is no such file.
+    """
+    try:
+        modified = file.stat().st_mtime_ns
+    except FileNotFoundError:
+        return {}
+    except OSError as error:
+        raise DikbenchError(f"file {file}: {error.strerror or error}") from None
+    return _read(file, modified)
+
+
+@lru_cache(maxsize=8)
+def _read(file: Path, _modified: int) -> Mapping[str, Tuned]:
+    """Read a file, again when it has been written since."""
+    try:
+        return msgspec.toml.decode(file.read_bytes(), type=dict[str, Tuned])
+    except OSError as error:
+        raise DikbenchError(f"file {file}: {error.strerror or error}") from None
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise DikbenchError(f"file {file}: not tuned parameters: {error}") from None
+
+
+def with_tuned(selector: Selector) -> Selector:
+    """Replace `tuned` in a formulation's selector by the parameters for which it stands.
+
+    Raises:
+        DikbenchError: if the formulation is unknown, or not tuned with the other parameters given.
+    """
+    if selector.parameters.get(TUNED) != "true":
+        return selector
+    given = {name: text for name, text in selector.parameters.items() if name != TUNED}
+    plain = Selector(selector.name, given)
+    file, key = file_for(plain), key_of(plain)
+    known = read_tuned(file)
+    if key not in known:
+        valid = ", ".join(known) or "none yet"
+        raise DikbenchError(
+            f"formulation {selector.name}[{TUNED}]: {key!r} is not tuned in {file}; valid: "
+            f"{valid}; `dikbench tune --freeze {plain}` adds it"
+        )
+    found = {name: f"{value:.{DIGITS}g}" for name, value in known[key].parameters.items()}
+    return Selector(selector.name, {**given, **found})
