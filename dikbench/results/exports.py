@@ -96,7 +96,8 @@ def _rows(file: Path, notes: list[str]) -> pd.DataFrame:
     """Read the rows of a CSV file as texts, except those that are cut off or too long."""
     if not file.is_file():
         raise DikbenchError(
-            f"no results in {file.parent}: neither results.sqlite nor {file.name} is there"
+            f"no results in {file.parent}: none of results.sqlite, {PARQUET} and {file.name} is "
+            "there"
         )
     try:
         text = file.read_text(encoding="utf-8")

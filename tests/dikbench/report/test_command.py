@@ -33,7 +33,8 @@ def test_a_folder_without_results_is_one_line_on_stderr(tmp_path: Path) -> None:
     answer = CliRunner().invoke(commands, ["report", str(tmp_path)])
     assert answer.exit_code == 2
     assert answer.stderr == (
-        f"error: no results in {tmp_path}: neither results.sqlite nor trials.csv is there\n"
+        f"error: no results in {tmp_path}: none of results.sqlite, trials.parquet and trials.csv "
+        "is there\n"
     )
 
 

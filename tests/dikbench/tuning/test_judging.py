@@ -26,7 +26,9 @@ def rows(
     scenarios: tuple[str, ...] = ("reach", "reach[distance=0.2]"),
 ) -> pd.DataFrame:
     """Make rows with both references, alike."""
-    each = [make_rows(dict(of_laws.items()), scenarios, reference=name) for name in ("time", "path")]
+    each = [
+        make_rows(dict(of_laws.items()), scenarios, reference=name) for name in ("time", "path")
+    ]
     return pd.concat(each, ignore_index=True)
 
 
