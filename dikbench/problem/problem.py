@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import groupby, pairwise
+from itertools import groupby
 from operator import attrgetter
 from typing import Final, Literal, Protocol, runtime_checkable
 
@@ -71,10 +71,12 @@ class DikProblem(msgspec.Struct, eq=False):
         if self.q.ndim == 1:
             self.robot.check_norms(self.q, "q")
         self.tasks = self._levels = tasks = tuple(self.tasks)
-        for first, second in pairwise(tasks):
-            if first.priority >= second.priority:
+        before = 0
+        for task in tasks:
+            if task.priority <= before:
                 self.tasks, self._levels = tuple(sorted(tasks, key=_PRIORITY)), None
                 break
+            before = task.priority
 
     @property
     def levels(self) -> tuple[LinearizedTask, ...]:

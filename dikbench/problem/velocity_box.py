@@ -173,7 +173,7 @@ class _Interior:
         """Say whether coordinates (nv,) or (N, nv) are inside."""
         if self.above is None or self.below is None or coordinates is None:
             return True
-        return not (_any(~(coordinates > self.above)) or _any(~(coordinates < self.below)))
+        return _all(coordinates > self.above) and _all(coordinates < self.below)
 
 
 @lru_cache(maxsize=256)
@@ -191,6 +191,11 @@ def _interior(joint: JointLimits, dt: float, braking: Braking, gain: float) -> _
 def _any(mask: Mask) -> bool:
     """Say whether anything of a mask holds; of one step alone lists are faster than numpy."""
     return True in mask.tolist() if mask.ndim == 1 else bool(mask.any())
+
+
+def _all(mask: Mask) -> bool:
+    """Say whether everything of a mask holds (see `_any`)."""
+    return False not in mask.tolist() if mask.ndim == 1 else bool(mask.all())
 
 
 def _reach(speed: Array, deceleration: Array, dt: float, braking: Braking, gain: float) -> Array:

@@ -85,7 +85,7 @@ def simulate(
     robot, model, dt = scenario.robot, scenario.robot.model, scenario.dt
     tracking, tasks, constraints = scenario.tracking, scenario.tasks, scenario.constraints
     kinematics, clock = Kinematics(robot), CLOCKS[mode](scenario)
-    started = plant.start(scenario, seed)
+    started, watches = plant.start(scenario, seed), type(plant).watch is not Plant.watch
     q, v_prev = read_only(scenario.q0.copy()), read_only(scenario.v0.copy())
     steps: list[_Step] = []
     kinematics_ns = formulation_ns = 0
@@ -120,7 +120,8 @@ def simulate(
             )
             before, q = q, read_only(pin.integrate(model, q, applied * dt))
             clock.advance(q)
-            started.watch(Step(k + 1, before, q, v_prev, applied))
+            if watches:
+                started.watch(Step(k + 1, before, q, v_prev, applied))
             v_prev = applied
     except TrialEnded as ended:
         status, message = ended.status, f"step {len(steps)}: {ended}"

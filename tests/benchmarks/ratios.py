@@ -53,13 +53,13 @@ HARNESS_MIX = (("dls", "none"), ("qp", WARM), ("lp-alpha", WARM))
 HARNESS_SCENARIO = "speed-sweep[robot=panda,speed=0.33,laps=3]"
 
 BARS = {
-    "qp_over_pink": (0.25, 0.15),
+    "qp_over_pink": (0.30, 0.20),
     "qp_over_mink": (0.25, 0.15),
     "qp_over_drake": (0.5, 0.25),
     "dls_over_numpy": (1.3, 0.8),
     "lp_over_cvxpy": (1 / 20, 1 / 50),
     "warm_over_cold": (1 / 2, 1 / 4),
-    "harness": (1.6, 1.25),
+    "harness": (1.4, 1.25),
     "growth_7_to_30": (4.0, 2.5),
     "evaluate_over_run": (0.4, 0.2),
 }

@@ -22,8 +22,10 @@ TILTS: Final = frozenset({3, 4})
 
 def goes_along_screw(robot: Robot) -> bool:
     """Say whether pose tasks bring a frame to its target along a screw (see `PoseTask`)."""
-    in_plane = robot.task_rows == PLANE_ROWS and not TILTS & {*robot.movable_rows}
-    return (in_plane or robot.task_rows == ALL_ROWS) and robot.task_axes == "body"
+    if robot.task_axes != "body":
+        return False
+    rows = robot.task_rows
+    return rows == ALL_ROWS or (rows == PLANE_ROWS and not TILTS & {*robot.movable_rows})
 
 
 @dataclass(frozen=True, eq=False)

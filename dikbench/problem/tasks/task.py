@@ -14,7 +14,7 @@ import scipy.linalg
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.linear_algebra import product, times, transposed
+from dikbench.linear_algebra import product, scaled_identity, times, transposed
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.robot import Robot, frame_id
 
@@ -69,7 +69,10 @@ class LinearizedJointTask(LinearizedTask, eq=False):
 
     def normal_equations(self, *, log_derivative: bool = False) -> tuple[Array, Array]:
         """Compute W and W V (see `LinearizedTask`)."""
-        return self.J * self.weight, self.V * self.weight
+        weight = self.weight
+        if type(weight) is float:  # the same matrix at every step
+            return scaled_identity(len(self.J), weight), self.V * weight
+        return self.J * weight, self.V * weight
 
 
 def check_weight(task: str, weight: float | Array, rows: int) -> None:
