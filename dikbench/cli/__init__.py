@@ -121,7 +121,7 @@ def _selected(study: str | None, axes: dict[str, Any], out: Path | None) -> tupl
 @study_options
 @click.option(
     "--instances",
-    type=click.IntRange(min=1),
+    type=click.IntRange(min=0),
     default=0,
     metavar="N",
     help="Draw N random instances of each scenario, in place of seeds; what its selector gives is "

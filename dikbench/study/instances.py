@@ -8,7 +8,7 @@ from typing import Final
 
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building_together import make_scenarios
-from dikbench.plugins.drawing import Cell, drawn_cell
+from dikbench.plugins.drawing import SEEDS_APART, Cell, drawn_cell
 from dikbench.selector import Selector, parse_selector
 from dikbench.study.identity import scenario_id
 from dikbench.study.split import SPLITS, split_of
@@ -63,6 +63,15 @@ def numbers_of(study: Study) -> range:
             f"valid: 1 to {len(allowed)}"
         )
     return allowed[: max(1, round(study.instances * study.fraction))]
+
+
+def is_instance_of(study: Study, scenario: str, seed: int) -> bool:
+    """Say whether a scenario and its seed may be an instance of a study, by what it fixes."""
+    drawn = parse_selector(scenario)
+    return seed % SEEDS_APART in numbers_of(study) and any(
+        given.name == drawn.name and given.parameters.items() <= drawn.parameters.items()
+        for given in map(parse_selector, study.scenarios)
+    )
 
 
 def draw_instance(given: Selector, number: int) -> list[Attempt]:
