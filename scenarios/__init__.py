@@ -23,6 +23,7 @@ from scenarios.log_derivative_drift import LogDerivativeDrift
 from scenarios.near_miss import NearMiss
 from scenarios.obstacle import ObstacleInTheWay
 from scenarios.pick_and_place import PickAndPlace
+from scenarios.random_joint_path import RandomJointPath
 from scenarios.reach import Reach
 from scenarios.self_collision import SelfCollision
 from scenarios.speed_sweep import SpeedSweep
@@ -46,6 +47,7 @@ SCENARIOS: Mapping[str, type[Family]] = MappingProxyType(
         "greedy-trap": GreedyTrap,
         "task-conflict": TaskConflict,
         "log-derivative-drift": LogDerivativeDrift,
+        "random-joint-path": RandomJointPath,
         "speed-sweep": SpeedSweep,
         "hexagon": Hexagon,
         "workspace-boundary": WorkspaceBoundary,

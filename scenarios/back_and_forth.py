@@ -101,7 +101,7 @@ class BackAndForth(Family):
     robot: str = "ur5"
     dt: float = 0.005
 
-    robots = tuple(SET_UPS)
+    robots = (*SET_UPS, "xarm7", "kinova", "tiago", "talos", "lwr")
     variation = Variation(direction=0.2, timing=0.1)
 
     def case(self, robot: Robot, change: Perturbation) -> Case:

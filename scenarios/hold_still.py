@@ -119,7 +119,7 @@ class HoldStill(Family):
 
     posture: Annotated[Literal["start", "singular", "limit"], Drawn()] = "start"
 
-    robots = tuple(POSTURES)
+    robots = (*POSTURES, "xarm7", "kinova", "tiago", "talos", "lwr")
     variation = Variation(start=0.1)
     tolerance_m = 0.001
 

@@ -125,7 +125,7 @@ class ObstacleInTheWay(Family):
     depth: Annotated[float, Range(0.01, 0.05, "m"), Drawn(0.015, 0.04)] = 0.03
     speed: Annotated[float, Range(0.05, 0.9), Drawn(0.1, 0.6)] = 0.3
 
-    robots = ("panda", "ur3", "ur5", "ur10", "xarm7")
+    robots = ("panda", "ur3", "ur5", "ur10", "xarm7", "kinova", "tiago", "lwr")
     variation = Variation(start=0.03, timing=0.1)
 
     def check(self) -> None:

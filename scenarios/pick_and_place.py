@@ -58,7 +58,7 @@ class PickAndPlace(Family):
     turn: Annotated[float, Range(0.0, 1.5, "rad"), Drawn(0.0, 1.0)] = 0.8
     speed: Annotated[float, Range(0.1, 3.0), Drawn(0.3, 1.2, log=True)] = 0.8
 
-    robots = ("panda", "ur3", "ur5", "ur10", "xarm7", "kinova", "tiago")
+    robots = ("panda", "ur3", "ur5", "ur10", "xarm7", "kinova", "tiago", "lwr", "talos")
     variation = Variation(start=0.05, direction=0.2)
     outruns_sampling = True
 

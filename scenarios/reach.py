@@ -60,7 +60,9 @@ class Reach(Family):
     angle: Annotated[float, Range(0.0, 1.5, "rad"), Drawn(0.05, 0.5)] = 0.3
     duration: Time = 2.5
 
-    robots = ("panda", "ur3", "ur5", "ur10", "xarm7", "talos", "planar3r", "planar4r")
+    robots = (
+        "panda", "ur3", "ur5", "ur10", "xarm7", "talos", "tiago", "lwr", "planar3r", "planar4r",
+    )  # fmt: skip
     variation = Variation(start=0.1, direction=pi)
 
     def case(self, robot: Robot, change: Perturbation) -> Case:

@@ -120,6 +120,21 @@ def _selected(study: str | None, axes: dict[str, Any], out: Path | None) -> tupl
 
 @commands.command()
 @study_options
+@click.option(
+    "--instances",
+    type=click.IntRange(min=0),
+    default=0,
+    metavar="N",
+    help="Draw N random instances of each scenario, in place of seeds; what its selector gives is "
+    "fixed.",
+)
+@click.option(
+    "--fraction",
+    type=click.FloatRange(min=0, max=1, min_open=True),
+    default=1.0,
+    metavar="SHARE",
+    help="Run the first SHARE of the instances; a larger one continues the run.",
+)
 @JOBS_OPTION
 @click.option(
     "--rerun",
@@ -295,14 +310,23 @@ def list_(subject: str | None) -> None:
     metavar="FILE",
     help="Draw a scenario: its path, the robot, singular values and margins (.svg, .png, .pdf).",
 )
+@click.option(
+    "--instance",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Draw instance N of a scenario and print what was drawn, and the command that runs it.",
+)
 @one_line_errors
-def show(name: str, figure: Path | None) -> None:
+def show(name: str, figure: Path | None, instance: int | None) -> None:
     """Print one formulation, scenario, solver, plant, robot, metric or study in full.
 
     Parameters may stand in brackets. A scenario's selector prints its certificate as well.
     """
-    from dikbench.cli.describing import description
+    from dikbench.cli.describing import description, drawn_instance
 
+    if instance is not None:
+        click.echo(drawn_instance(name, instance))
+        return
     text = description(name)
     if figure is not None:
         from dikbench.report.figures.scenario_drawing import draw_scenario

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import shlex
 from collections.abc import Mapping
 from math import isnan
 from pathlib import Path
@@ -35,6 +36,7 @@ from dikbench.solvers.catalogue.back_ends import (
     parse_solver,
 )
 from dikbench.solvers.catalogue.presets import TOLERANCES
+from dikbench.study.instances import draw_instance
 from dikbench.study.study import load_study, shipped_studies
 
 FEASIBLE: Final[Mapping[str, str]] = MappingProxyType(
@@ -75,6 +77,29 @@ def description(text: str) -> str:
             "scenario, solver, plant or robot"
         )
     return described
+
+
+def drawn_instance(text: str, number: int) -> str:
+    """Describe an instance of a scenario: what was drawn, and how it runs.
+
+    Raises:
+        DikbenchError: if there is no such family, or it has no such instance.
+    """
+    given = parse_selector(text)
+    *rejected, drawn = draw_instance(given, number)
+    command = shlex.join(
+        ["dikbench", "run", "--scenario", drawn.scenario, "--seed", str(drawn.seed)]
+    )
+    return "\n".join(
+        [
+            f"Instance {number} of {given}:",
+            f"  scenario: {drawn.scenario}",
+            f"  seed: {drawn.seed}",
+            f"  rejected before it: {len(rejected)}",
+            *(f"    {each.scenario}, seed {each.seed}: {each.rejected}" for each in rejected),
+            f"  it runs with: {command}",
+        ]
+    )
 
 
 def _without_parameters(name: str) -> str:

@@ -32,6 +32,9 @@ Selectors = str | Iterable[str]
 
 _LEAST_ONE = Range(1)
 
+NONE = Selection()
+"""Replaces nothing."""
+
 
 def run_study(
     study: str | Path | None = None,
@@ -42,6 +45,8 @@ def run_study(
     seeds: int | Iterable[int] = (),
     plants: Selectors = (),
     references: Selectors = (),
+    instances: int = 0,
+    fraction: float = 1.0,
     out: str | Path | None = None,
     jobs: int | None = None,
     trial_timeout: float = 120.0,
@@ -72,6 +77,9 @@ def run_study(
         seeds: seeds of the scenarios that replace those of the study.
         plants: selectors that replace those of the study.
         references: `time` or `path`: what advances the reference.
+        instances: number of random instances of each scenario that are drawn, in place of seeds; 0:
+            the study's own.
+        fraction: the share of the instances that is run, the first ones.
         out: results folder; default: runs/STUDY, and one of its own for each selection without a
             study.
         jobs: number of worker processes; default: one per core.
@@ -92,6 +100,8 @@ def run_study(
         _LEAST_ONE.check("jobs", jobs)
     _LEAST_ONE.check("trial_memory", trial_memory)
     Range(above=0.0, unit="s").check("trial_timeout", trial_timeout)
+    Range(0).check("instances", instances)
+    Range(above=0.0, high=1.0).check("fraction", fraction)
     _check_choice("traces", traces, get_args(TracePolicy))
     _check_choice("engine", engine, get_args(EngineChoice))
     selection = Selection(
@@ -101,6 +111,8 @@ def run_study(
         seeds=_seeds(seeds),
         plants=_texts("plants", plants),
         references=_texts("references", references),
+        instances=instances,
+        fraction=fraction,
     )
     for reference in selection.references:
         _check_choice("references", reference, REFERENCE_MODES)
@@ -109,7 +121,9 @@ def run_study(
         jobs or available_cores(), trial_timeout, trial_memory, traces, rerun, engine
     )
     folder = results_folder(chosen, out)
-    given = {axis: found for axis, found in asdict(selection).items() if found}
+    given = {
+        axis: found for axis, found in asdict(selection).items() if found != getattr(NONE, axis)
+    }
     runner.run_study(chosen, folder, settings, f"dikbench.run_study({study!r}, **{given})")
     if report:
         write_report(folder)

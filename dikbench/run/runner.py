@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -15,6 +16,7 @@ from dikbench.results.store import Store
 from dikbench.run.blocks import (
     engine_of,
 )
+from dikbench.run.folder_of_instances import instances_in
 from dikbench.run.folder_of_study import store_for
 from dikbench.run.in_workers import RunSettings, run_trials
 from dikbench.run.pool import THREAD_VARIABLES, workers
@@ -61,9 +63,9 @@ def run_study(study: Study, out: Path, settings: RunSettings, command: str) -> R
             fails, with committed rows kept.
         Interrupted: if the user stops the run; what is finished is kept.
     """
-    planned = expand(study)
-    _check_rerun(settings.rerun, planned)
     folder = ResultsFolder(out)
+    planned = expand(study, partial(instances_in, folder))
+    _check_rerun(settings.rerun, planned)
     with store_for(folder, study) as store:
         commit = git_commit()
         own = environment(commit, command)
@@ -262,7 +264,7 @@ def status_of(out: Path) -> dict[str, int]:
         described, done = store.manifest(), store.statuses()
     study = msgspec.convert(described["study"], Study)
     counts: dict[str, int] = {}
-    for p in expand(study):
+    for p in expand(study, partial(instances_in, folder)):
         status = done.get(p.id, "missing")
         counts[status] = counts.get(status, 0) + 1
     return counts

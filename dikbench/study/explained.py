@@ -20,6 +20,8 @@ VALID: Final[Mapping[str, str]] = MappingProxyType(
         "scenarios": 'a list of scenarios, such as ["reach", "near-miss[miss=0.02]"]',
         "plants": 'a list of plants, such as ["ideal"]',
         "references": 'a list of "time" and "path"',
+        "instances": "a whole number that is at least 0, such as 100",
+        "fraction": "a number above 0 and at most 1",
         "seeds": "a list of whole numbers that are at least 0, such as [0, 1]",
         "split": '"train" or "test"',
         "example": "one of the scenarios",
@@ -63,8 +65,10 @@ def explained(message: str) -> str:
     got = re.search(r"got `(.+)`", said)
     if got:
         what = f"is {_KINDS.get(got[1], got[1])}"
+    elif "array" in said:
+        what = "is empty"
     else:
-        what = "is empty" if "array" in said else "is too small"
+        what = "is too large" if "<" in said else "is too small"
     return f"{place} {what}; valid: {VALID[key]}"
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
 import msgspec
@@ -15,13 +15,15 @@ from dikbench.plugins.building import (
     make_scenario,
     scenario_parameters,
 )
+from dikbench.plugins.drawing import Cell
 from dikbench.problem.problem import Formulation, program_of
 from dikbench.scenario.oracle import ORACLE, ORACLES
 from dikbench.selector import Selector, parse_selector
 from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, parse_solver, why_not
 from dikbench.study.identity import trial_id
+from dikbench.study.instances import accepted, draw_missing, numbers_of
 from dikbench.study.split import check_split
-from dikbench.study.study import Study, load_study, naming
+from dikbench.study.study import Study, naming
 from dikbench.study.trial import NO_SOLVER, Trial
 
 SCENARIOS_BUILT_FIRST: Final = 40
@@ -39,45 +41,59 @@ class PlannedTrial(msgspec.Struct, frozen=True):
     skip: str = ""
 
 
-def expand(study: Study) -> list[PlannedTrial]:
+def draw_cells(study: Study) -> list[Cell]:
+    """Draw the instances of a study: selector and seed of each."""
+    return accepted(draw_missing(study))
+
+
+def expand(
+    study: Study, draw: Callable[[Study], Sequence[Cell]] = draw_cells
+) -> list[PlannedTrial]:
     """List every trial of a study, in a fixed order, each once.
 
     Names, parameters and solvers are checked, and the first scenarios are built, so that mistakes
     are found before anything runs. A formulation and a solver that do not work together stay in
     the plan, with the reason.
 
+    Args:
+        study: the study.
+        draw: gives selector and seed of the instances of a study that has some.
+
     Raises:
-        DikbenchError: on the first selector that does not name anything valid.
+        DikbenchError: on the first selector that does not name anything valid, or an instance that
+            cannot be drawn.
     """
     scenarios = [parse_selector(text) for text in study.scenarios]
-    all_plants = [parse_selector(text) for text in study.plants]
-    for number, scenario in enumerate(scenarios):
-        with naming(scenario, study.name):
-            if number < SCENARIOS_BUILT_FIRST:
-                make_scenario(scenario, study.seeds[0])
-            else:
-                scenario_parameters(scenario)
-    for plant in all_plants:
+    for plant in map(parse_selector, study.plants):
         with naming(plant, study.name):
             make_plant(plant)
-    _check_split(study, scenarios)
     _check_timing(study)
+    columns: list[tuple[Selector, list[tuple[Selector, str]]]] = [
+        (formulation, _solvers_for(study, formulation, cells.solvers))
+        for cells in study.cells
+        for formulation in map(parse_selector, cells.formulations)
+    ]
+    if study.instances:
+        numbers_of(study)
+        drawn = draw(study)
+    else:
+        _check_scenarios(study, scenarios)
+        drawn = list(itertools.product(scenarios, study.seeds))
+    if study.split:
+        check_split(study.name, study.split, [seed for _, seed in drawn])
     planned: dict[str, PlannedTrial] = {}
-    for cells in study.cells:
-        for formulation in map(parse_selector, cells.formulations):
-            plants, references = (
-                chosen or asked
-                for chosen, asked in zip(
-                    ways_of(formulation.name), (study.plants, study.references), strict=True
-                )
+    for formulation, solvers in columns:
+        plants, references = (
+            chosen or asked
+            for chosen, asked in zip(
+                ways_of(formulation.name), (study.plants, study.references), strict=True
             )
-            for solver, skip in _solvers_for(study, formulation, cells.solvers):
-                for scenario, plant, reference, seed in itertools.product(
-                    scenarios, map(parse_selector, plants), references, study.seeds
-                ):
-                    trial = Trial(formulation, scenario, solver, plant, reference, seed)
-                    name = trial_id(trial)
-                    planned.setdefault(name, PlannedTrial(name, trial, skip))
+        )
+        for solver, skip in solvers:
+            for (scenario, seed), plant, reference in _in_order(drawn, plants, references):
+                trial = Trial(formulation, scenario, solver, plant, reference, seed)
+                name = trial_id(trial)
+                planned.setdefault(name, PlannedTrial(name, trial, skip))
     return list(planned.values())
 
 
@@ -94,11 +110,24 @@ def ways_of(formulation: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return plants, ("time",) if formulation == ORACLE else ()
 
 
-def _check_split(study: Study, scenarios: Sequence[Selector]) -> None:
-    if study.split:
-        other = load_study("test" if study.split == "train" else "train")
-        reserved = [parse_selector(text) for text in other.scenarios]
-        check_split(study.name, study.split, scenarios, study.seeds, reserved)
+def _in_order(
+    drawn: Sequence[Cell], plants: Sequence[str], references: Sequence[str]
+) -> Iterator[tuple[Cell, Selector, str]]:
+    """Yield scenarios and seeds with plants and references, the seeds of each together."""
+    for _, cells in itertools.groupby(drawn, key=lambda cell: cell[0]):
+        for plant, reference, cell in itertools.product(
+            map(parse_selector, plants), references, list(cells)
+        ):
+            yield cell, plant, reference
+
+
+def _check_scenarios(study: Study, scenarios: Sequence[Selector]) -> None:
+    for number, scenario in enumerate(scenarios):
+        with naming(scenario, study.name):
+            if number < SCENARIOS_BUILT_FIRST:
+                make_scenario(scenario, study.seeds[0])
+            else:
+                scenario_parameters(scenario)
 
 
 def _check_timing(study: Study) -> None:

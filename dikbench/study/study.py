@@ -81,8 +81,11 @@ class Study(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         cells: formulations with their solvers.
         scenarios: selectors of scenarios.
         plants, references, seeds: see `Trial`.
-        split: "train" or "test" restricts the study to the seeds and scenarios of that split (see
-            `dikbench.study.split`); empty: any.
+        split: "train" or "test" restricts the study to the seeds, or the numbers of instances, of
+            that split (see `dikbench.study.split`); empty: any.
+        instances: number of random instances that are drawn of each scenario, in place of seeds;
+            what its selector gives is fixed (see `dikbench.study.instances`). 0: none are drawn.
+        fraction: the share of them that is run, the first ones.
         example: the scenario whose runs are drawn over time; default: the first one.
         timing: the timing pass; None: no timing.
         name: name of the study; default: the file's.
@@ -95,6 +98,8 @@ class Study(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     references: Annotated[tuple[Literal["time", "path"], ...], NOT_EMPTY] = ("time",)
     seeds: Annotated[tuple[Annotated[int, msgspec.Meta(ge=0)], ...], NOT_EMPTY] = (0,)
     split: Literal["", "train", "test"] = ""
+    instances: Annotated[int, msgspec.Meta(ge=0)] = 0
+    fraction: Annotated[float, msgspec.Meta(gt=0, le=1)] = 1.0
     example: str = ""
     timing: TimingSettings | None = None
     name: str = ""
@@ -131,10 +136,25 @@ def load_study(name_or_file: str) -> Study:
         raise DikbenchError(f"study {path}: not valid TOML: {error}") from None
     try:
         spread = _spread(msgspec.structs.replace(study, name=study.name or path.stem))
+        _check_instances(spread)
     except DikbenchError as error:
         raise DikbenchError(f"study {path}: {error}") from None
     _check_values(spread, path)
     return spread
+
+
+def _check_instances(study: Study) -> None:
+    """Check that what excludes instances is not given with them.
+
+    Raises:
+        DikbenchError: if it is.
+    """
+    if study.fraction != 1.0 and not study.instances:
+        raise DikbenchError("fraction is of instances; valid: with instances=N")
+    if study.instances and study.seeds != (0,):
+        raise DikbenchError("instances have seeds of their own; valid: instances or seeds")
+    if study.instances and study.timing is not None:
+        raise DikbenchError("instances are not timed; valid: instances without [timing]")
 
 
 def _check_values(study: Study, path: Path) -> None:
@@ -214,11 +234,17 @@ def folder_of(study: Study) -> str:
     """
     if study.name != SELECTED:
         return study.name
+    study = msgspec.structs.replace(study, fraction=1.0)  # a larger one continues the run
     return f"{SELECTED}-{digest(msgspec.json.encode(study).decode())[:DIGITS]}"
 
 
 class Selection(msgspec.Struct, frozen=True):
-    """Replacements of the axes of a study; an empty axis keeps the study's own."""
+    """Replacements of the axes of a study; an empty axis keeps the study's own.
+
+    Attributes:
+        instances: number of instances of each scenario, in place of seeds; 0: the study's own.
+        fraction: the share of them that is run.
+    """
 
     formulations: tuple[str, ...] = ()
     scenarios: tuple[str, ...] = ()
@@ -226,6 +252,8 @@ class Selection(msgspec.Struct, frozen=True):
     seeds: tuple[int, ...] = ()
     plants: tuple[str, ...] = ()
     references: tuple[str, ...] = ()
+    instances: int = 0
+    fraction: float = 1.0
 
 
 def select(base: Study, selection: Selection, *, named: bool) -> Study:
@@ -256,13 +284,23 @@ def select(base: Study, selection: Selection, *, named: bool) -> Study:
         for axis in ("scenarios", "seeds", "plants", "references")
         if getattr(selection, axis)
     }
+    if selection.seeds and selection.instances:
+        raise DikbenchError("instances have seeds of their own; valid: instances or seeds")
+    if selection.seeds:
+        changes["instances"] = 0
+    if selection.instances:
+        changes |= {"instances": selection.instances, "seeds": (0,), "timing": None}
+    if selection.fraction != 1.0:
+        changes["fraction"] = selection.fraction
     if base.example not in (selection.scenarios or base.scenarios):
         changes["example"] = ""
-    if base.timing is not None and selection.scenarios:
+    if base.timing is not None and selection.scenarios and not selection.instances:
         changes["timing"] = msgspec.structs.replace(base.timing, scenarios=())
     if not named:
         changes |= {"name": SELECTED, "description": "Selected on the command line"}
-    return msgspec.structs.replace(base, cells=cells, **changes)
+    made = msgspec.structs.replace(base, cells=cells, **changes)
+    _check_instances(made)
+    return made
 
 
 def _cells_for(base: Study, formulation: Selector, named: bool) -> Cells:

@@ -21,8 +21,10 @@ from dikbench.report.sentences.limitations import Limitation, limitations, missi
 from dikbench.report.sentences.summary import Summary, summarise
 from dikbench.report.tables.every import make_tables
 from dikbench.report.tables.failures import Failures, failures
+from dikbench.report.tables.instances import in_a_sentence, instances_table
 from dikbench.report.tables.return_codes import return_codes
 from dikbench.report.tables.table import Table
+from dikbench.results.instances import read_attempts
 from dikbench.results.reading import Results
 from dikbench.statistics.failures import SKIPPED, has_failed, ran
 from dikbench.statistics.trial_matrix import CONTENDER
@@ -80,7 +82,7 @@ class Contents:
         is said of trials, formulations, scenarios and seeds.
         """
         trials, study = self.results.trials, self.manifest["study"]
-        status = trials["status"]
+        status, drawn = trials["status"], study.get("instances")
         rows = ran(trials)
         skipped = int(status.eq(SKIPPED).sum())
         absent = {"cells skipped", "missing"}
@@ -98,7 +100,7 @@ class Contents:
             *(
                 _of_plan(
                     rows[axis].nunique(),
-                    len({*trials[axis], *study.get(f"{axis}s", ())}),
+                    len({*trials[axis], *(() if drawn else study.get(f"{axis}s", ()))}),
                     axis,
                     f"{axis}s",
                 )
@@ -159,6 +161,12 @@ def gather(results: Results, figures: Sequence[Figure]) -> Contents:
         return_codes(trials),
         families_of(trials),
         formulations_of(trials),
-        limitations(trials, results.manifest, results.notes),
+        [*limitations(trials, results.manifest, results.notes), *_rejections(results)],
         figures,
     )
+
+
+def _rejections(results: Results) -> list[Limitation]:
+    """Say how many draws of instances were rejected, where some were drawn."""
+    attempts = read_attempts(results.folder.path)
+    return [Limitation(in_a_sentence(instances_table(attempts)))] if attempts else []

@@ -167,13 +167,13 @@ def _read(name: str) -> tuple[str | None, dict[str, str]]:
 
 def families_of(trials: pd.DataFrame) -> list[Family]:
     """The families of a run in its order, with the certificates of their scenarios."""
-    seed = int(trials["seed"].min())
+    seeds = trials.groupby("scenario")["seed"].min()
     known = plugins("scenario")
     found = []
     for name, selectors in _by_name(trials, "scenario").items():
         plugin = known.get(name)
         text = plugin.factory.__doc__ or "" if plugin else _read(name)[0] if in_file(name) else None
-        certified, variation = _certified(selectors[:MOST_CERTIFICATES], seed)
+        certified, variation = _certified(selectors[:MOST_CERTIFICATES], seeds)
         found.append(
             Family(
                 name,
@@ -186,11 +186,11 @@ def families_of(trials: pd.DataFrame) -> list[Family]:
     return found
 
 
-def _certified(selectors: Iterable[str], seed: int) -> tuple[tuple[Certified, ...], str]:
+def _certified(selectors: Iterable[str], seeds: pd.Series) -> tuple[tuple[Certified, ...], str]:
     """Scenarios with their certificates, and what a seed perturbs of the last one."""
     found, variation = [], ""
     for selector in selectors:
-        scenario = built(selector, seed)
+        scenario = built(selector, int(seeds[selector]))
         if isinstance(scenario, str):
             found.append(Certified(selector, (), scenario))
         else:

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+import msgspec
 import pandas as pd
 
 from dikbench.plugins.finding import plugins
@@ -17,7 +18,9 @@ from dikbench.solvers.catalogue.back_ends import BACK_ENDS, DEFAULT_SOLVER, is_i
 from dikbench.statistics.failures import SKIPPED, has_failed
 from dikbench.statistics.stability import STABLE
 from dikbench.statistics.trial_matrix import CONTENDER
+from dikbench.study.instances import is_instance_of
 from dikbench.study.plan import ways_of
+from dikbench.study.study import Study
 
 FEW_SCENARIOS: Final = 2
 """More scenarios than this (and one) are counted, not listed."""
@@ -91,9 +94,14 @@ def in_plan(trials: pd.DataFrame, study: Mapping[str, Any]) -> pd.Series:
             wanted = {name: ways_of(name)[place] or asked for name in names.unique()}
             pairs = zip(names, trials[axis], strict=True)
             inside &= pd.Series([value in wanted[name] for name, value in pairs], trials.index)
-    for axis in ("scenario", "seed"):
-        if asked := study.get(f"{axis}s"):
-            inside &= trials[axis].isin(asked)
+    if study.get("instances"):
+        drawn = msgspec.convert(study, Study)
+        of_scenarios = zip(trials["scenario"], trials["seed"], strict=True)
+        inside &= pd.Series([is_instance_of(drawn, *cell) for cell in of_scenarios], trials.index)
+    else:
+        for axis in ("scenario", "seed"):
+            if asked := study.get(f"{axis}s"):
+                inside &= trials[axis].isin(asked)
     if cells := study.get("cells"):
         asked = {
             (formulation, solver)

@@ -1,0 +1,297 @@
+"""Instances: reproducible by number, in own streams, robots in equal shares, none shared."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from dikbench.errors import DikbenchError
+from dikbench.plugins.building import make_family, make_scenario
+from dikbench.plugins.drawing import SEEDS_APART, drawn_cell, drawn_parameters, drawn_robots
+from dikbench.plugins.finding import plugins, scenario_plugin
+from dikbench.report.tables.instances import instances_table
+from dikbench.results.folder import ResultsFolder
+from dikbench.results.instances import INSTANCES, read_attempts
+from dikbench.run.folder_of_instances import instances_in
+from dikbench.selector import Selector, parse_selector
+from dikbench.study import instances
+from dikbench.study.instances import Attempt, accepted, draw, draw_instance, numbers_of
+from dikbench.study.plan import expand
+from dikbench.study.split import SPLITS, split_of
+from dikbench.study.study import Selection, Study, folder_of, load_study, select
+
+DRAWN = sorted(set(plugins("scenario")) - {"csv"})
+
+CHEAP = "reach"
+
+
+def _study(**changes: Any) -> Study:
+    selection = Selection(formulations=("pinv",), scenarios=(CHEAP,), instances=6)
+    return select(load_study("quick"), replace(selection, **changes), named=False)
+
+
+@settings(max_examples=80, deadline=None)
+@given(st.sampled_from(DRAWN), st.integers(1, 999), st.integers(0, 60))
+def test_what_is_drawn_is_exact_as_text_and_inside_its_range(
+    name: str, number: int, attempt: int
+) -> None:
+    """The text gives the same selector, numbers have four digits, and drawing again the same."""
+    cell = drawn_cell(Selector(name), number, attempt)
+    assert cell == drawn_cell(Selector(name), number, attempt)
+    selector, seed = cell
+    again = parse_selector(str(selector))
+    assert str(again) == str(selector)
+    assert split_of(seed) == split_of(number)
+    for key, parameter in drawn_parameters(scenario_plugin(name), Selector(name)).items():
+        text = again.parameters[key]
+        if parameter.choices:
+            assert text in map(str, parameter.choices)
+            continue
+        assert parameter.drawn is not None
+        assert parameter.drawn.low <= float(text) <= parameter.drawn.high
+        assert parameter.type is int or float(text) == float(f"{float(text):.4g}")
+        assert repr(parameter.type(text)) == text
+    try:
+        family = make_family(again)
+    except DikbenchError:  # such as an elbow that the robot has not
+        return
+    assert all(str(getattr(family, key)) == text for key, text in again.parameters.items())
+
+
+@pytest.mark.parametrize("name", ["near-miss", "speed-sweep", "obstacle"])
+def test_a_parameter_that_is_given_moves_no_other(name: str) -> None:
+    """Each has a stream of its own, whether the others are drawn or fixed."""
+    whole = drawn_cell(Selector(name), 117)[0].parameters
+    for fixed in drawn_parameters(scenario_plugin(name), Selector(name)):
+        drawn = drawn_cell(Selector(name, {fixed: "0.0123"}), 117)[0].parameters
+        assert drawn == {**whole, fixed: "0.0123"}
+    assert drawn_cell(Selector(name, {"robot": "ur10"}), 117)[0].parameters == {
+        **whole,
+        "robot": "ur10",
+    }
+
+
+def test_the_streams_of_parameters_numbers_attempts_and_families_differ() -> None:
+    """Nothing repeats where it should not."""
+    drawn = [
+        drawn_cell(Selector(name), number, attempt)[0].parameters["speed"]
+        for name in ("near-miss", "random-joint-path", "speed-sweep")
+        for number in (1, 2, 100)
+        for attempt in (0, 1)
+    ]
+    assert len(set(drawn)) == len(drawn)
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_robots_are_in_equal_shares_and_stay_with_their_number(name: str) -> None:
+    """By number, whatever is rejected."""
+    robots = drawn_robots(scenario_plugin(name), Selector(name))
+    turns = [drawn_cell(Selector(name), n)[0].parameters["robot"] for n in range(100, 200)]
+    counts = Counter(turns)
+    assert set(counts) == set(robots)
+    assert max(counts.values()) - min(counts.values()) <= 1
+    later = [drawn_cell(Selector(name), n, 7)[0].parameters["robot"] for n in range(100, 200)]
+    assert later == turns
+
+
+def test_a_logarithm_is_drawn_uniformly_where_it_is_declared() -> None:
+    """Half of them are below the geometric mean, of a number drawn linearly below the middle."""
+    drawn = [drawn_cell(Selector("near-miss"), n)[0].parameters for n in range(100, 1000)]
+    below = sum(float(each["miss"]) < (0.002 * 0.05) ** 0.5 for each in drawn)
+    assert abs(below - 450) < 75  # five standard deviations
+    swept = [drawn_cell(Selector("speed-sweep"), n)[0].parameters for n in range(100, 1000)]
+    assert abs(sum(float(each["radius"]) < 0.1 for each in swept) - 450) < 75
+
+
+def test_what_is_rejected_is_drawn_again_with_its_robot_and_counted() -> None:
+    """Every scenario that is left builds; each rejected one does not, for the reason it gives."""
+    attempts = draw(parse_selector("near-miss"), range(100, 116))
+    cells = accepted(attempts)
+    assert [seed % SEEDS_APART for _, seed in cells] == [*range(100, 116)]
+    rejected = [each for each in attempts if each.rejected]
+    assert rejected
+    for each in rejected:
+        with pytest.raises(DikbenchError) as caught:
+            make_scenario(each.scenario, each.seed)
+        assert str(caught.value) == each.rejected
+    for selector, seed in cells[:4]:
+        assert make_scenario(selector, seed).steps > 0
+    robot = {each.number: parse_selector(each.scenario).parameters["robot"] for each in attempts}
+    assert all(parse_selector(a.scenario).parameters["robot"] == robot[a.number] for a in attempts)
+    table = instances_table(attempts)
+    assert table["accepted"].sum() == 16
+    assert table["rejected"].sum() == len(rejected)
+    assert table.loc[table["rejected"] > 0, "first_reasons"].ne("").all()
+    alone = draw_instance(parse_selector("near-miss"), rejected[0].number)
+    assert alone == [each for each in attempts if each.number == rejected[0].number]
+
+
+@pytest.mark.parametrize("most", [2, 3])
+def test_an_instance_that_nothing_is_found_for_is_an_error(
+    monkeypatch: pytest.MonkeyPatch, most: int
+) -> None:
+    """One line that names family, robot, number and the last reason."""
+    monkeypatch.setattr(instances, "MOST_ATTEMPTS", most)
+    with pytest.raises(DikbenchError) as caught:
+        draw(parse_selector("near-miss[robot=talos,singularity=wrist]"), [101])
+    text = str(caught.value)
+    for part in ("near-miss", "robot talos", "instance 101", f"{most} attempts", "no wrist"):
+        assert part in text
+    assert "\n" not in text
+
+
+@pytest.mark.parametrize(
+    ("selector", "part"),
+    [
+        ("csv[file=tests/data/triangle.csv]", "leaves nothing to draw"),
+        ("reach[robot=ur5,distance=0.1,angle=0.2]", "leaves nothing to draw"),
+        ("no-such-family", "no-such-family"),
+        ("reach[distanc=0.1]", "distanc"),
+        ("reach[distance=9]", "distance=9"),
+    ],
+)
+def test_what_cannot_be_drawn_is_an_error(selector: str, part: str) -> None:
+    """Before anything is built."""
+    with pytest.raises(DikbenchError, match=part):
+        draw(parse_selector(selector), [100])
+
+
+@pytest.mark.parametrize("number", [0, 1000, 1101])
+def test_a_number_in_no_split_is_an_error(number: int) -> None:
+    """The message says which are."""
+    with pytest.raises(DikbenchError, match=r"1 to 99 .train. and 100 to 999 .test."):
+        draw_instance(parse_selector(CHEAP), number)
+
+
+def test_train_and_test_share_no_instance_and_no_seed() -> None:
+    """Not at any attempt: seeds differ, and so does every number that is drawn."""
+    cells: dict[str, set[tuple[str, int]]] = {}
+    for name, numbers in SPLITS.items():
+        cells[name] = {
+            (str(selector), seed)
+            for family in DRAWN
+            for number in (*numbers[:12], numbers[-1])
+            for attempt in (0, 1, instances.MOST_ATTEMPTS)
+            for selector, seed in (drawn_cell(Selector(family), number, attempt),)
+        }
+        assert len(cells[name]) == len(DRAWN) * 13 * 3
+    assert not {seed for _, seed in cells["train"]} & {seed for _, seed in cells["test"]}
+    assert not cells["train"] & cells["test"]
+
+
+def test_a_folder_keeps_its_instances_and_draws_only_what_it_lacks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A smaller fraction is a prefix; a larger one continues; another source is drawn anew."""
+    folder = ResultsFolder(tmp_path / "run")
+    asked: list[list[int]] = []
+    drawing = instances.draw
+
+    def counted(given: Selector, numbers: Sequence[int], *more: Any) -> list[Attempt]:
+        asked.append([*numbers])
+        return drawing(given, numbers, *more)
+
+    monkeypatch.setattr(instances, "draw", counted)
+    half = instances_in(folder, _study(fraction=0.5))
+    whole = instances_in(folder, _study())
+    assert asked == [[100, 101, 102], [103, 104, 105]]
+    assert whole[:3] == half
+    assert instances_in(folder, _study(fraction=0.5)) == half
+    assert len(asked) == 2
+    assert whole == accepted(draw(parse_selector(CHEAP), range(100, 106)))
+    kept = read_attempts(folder.path)
+    file = folder.path / INSTANCES
+    file.write_text(file.read_text().replace(kept[0].source, "0" * 16))
+    assert instances_in(folder, _study()) == whole
+    assert asked[-1] == [*range(100, 106)]
+    assert read_attempts(folder.path) == kept
+    file.write_text("given,number\nx,1\n")
+    with pytest.raises(DikbenchError, match="not a table of instances"):
+        instances_in(folder, _study())
+
+
+def test_a_study_runs_each_formulation_on_each_instance_once() -> None:
+    """At its own seed; references and plants as ever; a fraction is a prefix in the same folder."""
+    study = _study(references=("time", "path"), formulations=("pinv", "dls"))
+    trials = [p.trial for p in expand(study)]
+    assert len(trials) == 6 * 2 * 2
+    cells = {(trial.scenario, trial.seed) for trial in trials}
+    assert cells == set(accepted(draw(parse_selector(CHEAP), range(100, 106))))
+    part = _study(references=("time", "path"), formulations=("pinv", "dls"), fraction=0.5)
+    assert {p.id for p in expand(part)} < {p.id for p in expand(study)}
+    assert folder_of(part) == folder_of(study)
+
+
+@pytest.mark.parametrize(("fraction", "number"), [(0.001, 1), (0.1, 10), (0.29, 29), (1.0, 100)])
+def test_a_fraction_is_the_first_numbers(fraction: float, number: int) -> None:
+    """At least one."""
+    study = replace(load_study("ensembles"), fraction=fraction)
+    assert numbers_of(study) == range(100, 100 + number)
+
+
+@pytest.mark.parametrize("split", ["train", "test"])
+def test_the_shipped_splits_draw_every_family_that_may_be_drawn(split: str) -> None:
+    """Numbers from the beginning of their split."""
+    study = load_study(split)
+    assert sorted(study.scenarios) == DRAWN
+    assert study.split == split
+    assert numbers_of(study)[0] == SPLITS[split].start
+
+
+@pytest.mark.parametrize(
+    ("changes", "part"),
+    [
+        ({"seeds": (1,)}, "instances or seeds"),
+        ({"instances": 0, "fraction": 0.5}, "fraction is of instances"),
+        ({"instances": 1000}, "valid: 1 to 900"),
+    ],
+)
+def test_wrong_use_of_instances_is_an_error(changes: dict[str, Any], part: str) -> None:
+    """One line."""
+    with pytest.raises(DikbenchError, match=part):
+        expand(_study(**changes))
+
+
+@pytest.mark.parametrize(
+    ("lines", "part"),
+    [
+        ("instances = 3\nseeds = [1]", "instances or seeds"),
+        ("instances = 3\n[timing]\nreference = 'dls'", "not timed"),
+        ("instances = -1", "instances"),
+        ("instances = 2\nfraction = 2.0", "fraction"),
+        ("fraction = 0.5", "fraction is of instances"),
+    ],
+)
+def test_a_wrong_file_is_an_error_that_names_it(tmp_path: Path, lines: str, part: str) -> None:
+    """In one line."""
+    file = tmp_path / "mine.toml"
+    top, _, table = lines.partition("[timing]")
+    tail = f"[timing]{table}" if table else ""
+    cells = '[[cells]]\nformulations = ["pinv"]\n'
+    file.write_text(f'description = "x"\nscenarios = ["reach"]\n{top}\n{cells}{tail}')
+    with pytest.raises(DikbenchError, match=part) as caught:
+        load_study(str(file))
+    assert str(file) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_seed_in_place_of_instances_runs_the_scenarios_themselves() -> None:
+    """Each option replaces an axis of the study."""
+    study = select(load_study("train"), Selection(seeds=(3,), scenarios=(CHEAP,)), named=True)
+    assert {(str(p.trial.scenario), p.trial.seed) for p in expand(study)} == {(CHEAP, 3)}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", DRAWN)
+def test_most_of_what_is_drawn_is_accepted(name: str) -> None:
+    """At least half of the first attempts, of every family."""
+    attempts: list[Attempt] = draw(parse_selector(name), range(100, 130))
+    first = [each for each in attempts if each.seed < SEEDS_APART]
+    assert sum(not each.rejected for each in first) >= len(first) / 2
