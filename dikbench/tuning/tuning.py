@@ -16,6 +16,7 @@ from dikbench.plugins.building import make_formulation
 from dikbench.plugins.source import digest
 from dikbench.plugins.tuned import Tuned, file_for, key_of, read_tuned
 from dikbench.problem.problem import program_of
+from dikbench.results.instances import read_attempts, write_attempts
 from dikbench.results.reading import read_results, without_attributes
 from dikbench.run.in_workers import RunSettings
 from dikbench.run.runner import run_study
@@ -92,8 +93,10 @@ def tune(
         chosen = tried[str(default)]
         asked = with_cells(study, [default, *chosen])
         name = key_of(default)
+        _hand_over_instances(out, out / name)
         print(f"{default} ({number} of {len(formulations)})", file=sys.stderr)
         folder = run_study(asked, out / name, settings, command)
+        _hand_over_instances(folder.path, out)
         trials = without_attributes(read_results(folder.path)).trials
         scored = scores(trials, default, chosen)
         found = scored.best.parameters
@@ -107,6 +110,13 @@ def tune(
             default_success=round(float(scored.success[0]), 4),
         )
         yield Tuning(name, scored, entry)
+
+
+def _hand_over_instances(known: Path, folder: Path) -> None:
+    """Copy the instances of one folder to another that has none, so that they are drawn once."""
+    if (attempts := read_attempts(known)) and not read_attempts(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        write_attempts(folder, attempts)
 
 
 def report_on_test(
