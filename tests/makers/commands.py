@@ -7,12 +7,15 @@ import os
 import signal
 import subprocess
 import sys
+import traceback
 from collections.abc import Sequence
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
+import pytest
 from click.testing import CliRunner, Result
 
-from dikbench.cli import commands
+from dikbench.cli import commands, main
 
 
 def dikbench(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
@@ -25,6 +28,11 @@ def dikbench(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
         timeout=300,
         check=False,
     )
+
+
+def hear_ctrl_c() -> None:
+    """Undo in a new process that SIGINT is ignored: a shell's in the background hand that down."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def in_process(*arguments: str) -> Result:
@@ -42,30 +50,35 @@ SHORT = (
 )  # fmt: skip
 
 
-ONE_AFTER_THE_OTHER = """
-import json, os, sys, traceback
-from pathlib import Path
-from dikbench.cli import main
+def one_after_the_other(commands: Sequence[Sequence[str]]) -> None:
+    """Run commands as `dikbench` does, each in a folder of its own in the current one.
 
-streams, folder = (os.dup(1), os.dup(2)), Path.cwd()
-for number, arguments in enumerate(json.loads(sys.argv[1])):
-    os.chdir(folder / str(number) / "cwd")
-    for stream, name in ((1, "stdout"), (2, "stderr")):
-        os.dup2(os.open(f"../{name}", os.O_WRONLY | os.O_CREAT), stream)
-    sys.argv, code = ["dikbench", *arguments], None
+    What libraries of C write is caught as well. `dikbench run` sets a handler of SIGTERM.
+    """
+    streams, folder, given = (os.dup(1), os.dup(2)), Path.cwd(), sys.argv
+    handler = signal.getsignal(signal.SIGTERM)
     try:
-        main()
-    except SystemExit as left:
-        code = left.code
-    except BaseException:
-        traceback.print_exc()
-    sys.stdout.flush()
-    Path("../code").write_text(json.dumps(code))
-for stream, kept in enumerate(streams, start=1):
-    os.dup2(kept, stream)
-"""
-"""Runs many commands in one process, each in a folder of its own: most of the time of a command
-that ends in an error is taken by imports."""
+        for number, arguments in enumerate(commands):
+            os.chdir(folder / str(number) / "cwd")
+            sys.argv, code = ["dikbench", *arguments], None
+            with Path("../stdout").open("w") as out, Path("../stderr").open("w") as err:
+                os.dup2(out.fileno(), 1)
+                os.dup2(err.fileno(), 2)
+                with redirect_stdout(out), redirect_stderr(err):
+                    try:
+                        main()
+                    except SystemExit as left:
+                        code = left.code
+                    except BaseException:
+                        traceback.print_exc()
+            Path("../code").write_text(json.dumps(code))
+    finally:
+        for stream, kept in enumerate(streams, start=1):
+            os.dup2(kept, stream)
+            os.close(kept)
+        os.chdir(folder)
+        sys.argv = given
+        signal.signal(signal.SIGTERM, handler)
 
 
 CLASSES = """
@@ -139,7 +152,11 @@ GANTRY = """
 def run_all(
     folder: Path, commands: Sequence[Sequence[str]], path: Path | None = None
 ) -> list[Path]:
-    """Run commands; of each a folder with `stdout`, `stderr`, `code`, and `cwd`, where it ran."""
+    """Run commands; of each a folder with `stdout`, `stderr`, `code`, and `cwd`, where it ran.
+
+    They run in this process, where all is imported already, or in one of their own that finds
+    packages at a path.
+    """
     folders = [folder / str(number) for number in range(len(commands))]
     for each in folders:
         (each / "cwd").mkdir(parents=True)
@@ -150,7 +167,14 @@ def run_all(
         (each / "cwd" / "untimed.toml").write_text(UNTIMED)
         (each / "cwd" / "needs.py").write_text(NEEDS)
         (each / "cwd" / "gantry.urdf").write_text(GANTRY)
-    command = [sys.executable, "-c", ONE_AFTER_THE_OTHER, json.dumps(commands)]
-    environment = os.environ if path is None else {**os.environ, "PYTHONPATH": str(path)}
+    if path is None:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.chdir(folder)
+            one_after_the_other(commands)
+        return folders
+    code = "import json, sys; from makers.commands import one_after_the_other as run; "
+    command = [sys.executable, "-c", code + "run(json.loads(sys.argv[1]))", json.dumps(commands)]
+    found = os.pathsep.join([str(path), str(Path(__file__).parents[1])])
+    environment = {**os.environ, "PYTHONPATH": found}
     subprocess.run(command, cwd=folder, env=environment, check=True, timeout=600)
     return folders

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from makers.commands import SHORT, dikbench
+from makers.commands import SHORT, dikbench, hear_ctrl_c
 
 TIRES = """
 from dataclasses import dataclass
@@ -44,8 +44,7 @@ def test_ctrl_c_keeps_what_is_finished_and_says_how_to_go_on(tmp_path: Path) -> 
         stdout=subprocess.DEVNULL,
         text=True,
         cwd=tmp_path,
-        # A shell starts what is in the background deaf to Ctrl-C, which children inherit.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        preexec_fn=hear_ctrl_c,
     )
     store = tmp_path / "out" / "results.sqlite"
     for _ in range(600):
