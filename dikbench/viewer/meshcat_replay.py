@@ -43,9 +43,9 @@ def serve_replay(recording: Recording, speed: float) -> None:
         DikbenchError: if meshcat is missing.
     """
     with _scene(recording, speed) as viewer:
-        print(f"{viewer.url()} (Ctrl-C ends)", flush=True)
-        viewer.open()
         try:
+            print(f"{viewer.url()} (Ctrl-C ends)", flush=True)
+            viewer.open()
             while True:
                 time.sleep(1)
         except KeyboardInterrupt:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -57,6 +58,7 @@ class Import(NamedTuple):
     module: str
 
 
+@cache
 def imports_of(root: Path) -> list[Import]:
     """Read every import of the three packages below a folder, wherever in a file it stands."""
     found = []
@@ -179,29 +181,26 @@ def _reachable(edges: dict[str, set[str]], start: str) -> set[str]:
     return found
 
 
-IMPORTS: Final = imports_of(CHECKOUT)
-
-
 def test_imports_were_read() -> None:
     """The checks below look at hundreds of imports, of every room."""
-    assert len(IMPORTS) > 700
-    assert {floor(module_of(file)) for file, _ in IMPORTS} >= set(range(len(ROOMS)))
+    assert len(imports_of(CHECKOUT)) > 700
+    assert {floor(module_of(file)) for file, _ in imports_of(CHECKOUT)} >= set(range(len(ROOMS)))
 
 
 def test_no_import_runs_up_the_floors() -> None:
     """A room imports only from rooms below it; the harness never imports its plug-ins."""
-    assert upward(IMPORTS) == []
-    assert looking_back(IMPORTS) == []
+    assert upward(imports_of(CHECKOUT)) == []
+    assert looking_back(imports_of(CHECKOUT)) == []
 
 
 def test_no_folder_is_in_a_cycle() -> None:
     """Folders, at any depth, form no cycle."""
-    assert cycles(IMPORTS) == []
+    assert cycles(imports_of(CHECKOUT)) == []
 
 
 def test_plug_ins_come_in_through_the_doors() -> None:
     """Formulations and families import nothing of the harness but its doors."""
-    assert past_the_doors(IMPORTS) == []
+    assert past_the_doors(imports_of(CHECKOUT)) == []
 
 
 def test_every_module_is_in_a_room() -> None:
@@ -239,7 +238,7 @@ def test_tests_mirror_the_rooms() -> None:
 def test_each_check_finds_what_it_looks_for(check: object, broken: Import, said: str) -> None:
     """One import that must not be, put among the real ones, is named."""
     assert callable(check)
-    found = check([*IMPORTS, broken])
+    found = check([*imports_of(CHECKOUT), broken])
     assert any(said in line for line in found)
 
 

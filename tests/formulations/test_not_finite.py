@@ -7,6 +7,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from makers.turns import in_turns
 
 from dikbench import linear_algebra
 from dikbench.arrays import Array
@@ -61,9 +62,9 @@ def _solve(name: str) -> CheckedSolve:
     return make_solve(None if program is None else parse_solver(DEFAULT_SOLVER[program]), program)
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-@pytest.mark.parametrize("place", PLACES)
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    ("name", "place", "bad"), in_turns(NAMES, PLACES, [np.nan, np.inf, -np.inf], every=3)
+)
 def test_a_problem_that_is_not_finite_ends_the_trial(name: str, place: str, bad: float) -> None:
     """As `not-finite`, and the message says what is not; an infinite h constrains nothing."""
     if place == "h" and np.isinf(bad):

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+
+Install = Callable[..., None]
+"""What the fixture `install` gives: it replaces every registered plug-in of a group."""
 
 
 def law_with(folder: Path, fields: str, imports: str = "") -> str:

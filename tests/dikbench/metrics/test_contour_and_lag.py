@@ -4,104 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, cast
 
 import numpy as np
 import pinocchio as pin
 import pytest
-from scipy.optimize import minimize_scalar
+from makers.frame_motions import (
+    DT,
+    EIGHT,
+    PERIOD,
+    ROUND,
+    ROUND_TWICE,
+    SAMPLE_S,
+    TOLERANCE,
+    back_and_forth,
+    of,
+    on,
+    straight,
+    with_dwell,
+)
 
 from dikbench.arrays import Array
-from dikbench.metrics import Motion, evaluate
-from dikbench.problem.tasks import OrientationTask, PoseTask
-from dikbench.robots.loading import load_robot
-from dikbench.scenario import Scenario
-from dikbench.scenario.certificate import Certificate
-from dikbench.scenario.reference.curves import circle, lemniscate
-from dikbench.scenario.reference.path import ReferencePath, reference_path
+from dikbench.metrics import evaluate
+from dikbench.problem.tasks import OrientationTask
 from dikbench.scenario.reference.reference import Reference, target_at_rest
-from dikbench.simulation.clock import ReferenceMode
-from dikbench.simulation.trace import Trace
-
-DT = 0.01
-ROBOT = load_robot("panda")
-PERIOD = 2.0
-TOLERANCE = 5e-3
-ROUND_TWICE = 0.4 * math.pi
-SAMPLE_S = DT / 4
-"""A path is sampled so often, and a lag is a multiple of it."""
-
-Place = Callable[[float], Array]
-
-
-def straight(duration: float = 2.0, speed: float = 0.3) -> Reference:
-    """Along x at a constant speed [m/s]."""
-    return Reference(
-        duration,
-        lambda tau: pin.SE3(np.eye(3), np.array([speed * tau, 0.0, 0.0])),
-        lambda tau: np.array([speed, 0, 0, 0, 0, 0]),
-    )
-
-
-def back_and_forth(duration: float = 4.0) -> Reference:
-    """Along x over 0.5 m and back on the same line, at 0.25 m/s."""
-    return Reference(
-        duration,
-        lambda tau: pin.SE3(np.eye(3), np.array([0.5 - abs(0.5 - 0.25 * tau), 0.0, 0.0])),
-        lambda tau: np.array([0.25, 0, 0, 0, 0, 0]),
-    )
-
-
-def with_dwell() -> Reference:
-    """0.3 m in a second, a second's rest, 0.3 m in another second, at constant speed."""
-
-    def x(tau: float) -> float:
-        return 0.3 * (min(tau, 1.0) + max(tau - 2.0, 0.0))
-
-    return Reference(
-        3.0,
-        lambda tau: pin.SE3(np.eye(3), np.array([x(tau), 0.0, 0.0])),
-        lambda tau: np.zeros(6),
-    )
-
-
-ROUND = circle(pin.SE3.Identity(), 0.1, PERIOD, 2.0)
-EIGHT = lemniscate(pin.SE3.Identity(), 0.1, PERIOD, 2.0)
-
-
-def of(
-    reference: Reference, place: Place, tau: Array | None = None, tracking: Any = None
-) -> Motion:
-    """The motion of a frame that is at place(t) at the trace time t; 0.01 s per step."""
-    n = round(reference.duration / DT)
-    t = DT * np.arange(n + 1.0)
-    mode: ReferenceMode = "time" if tau is None else "path"
-    tau = t if tau is None else tau
-    translations = np.array([place(time) for time in t])
-    targets = np.array([reference.placement(each).translation for each in tau.tolist()])
-    v, steps = np.zeros((n, 7)), np.zeros(n, dtype=int)
-    rows = 6 if tracking is None else 3
-    trace = Trace(
-        DT, np.tile(ROBOT.q0, (n + 1, 1)), tau, np.zeros((n, rows)), v, v, steps, steps, steps - 1,
-        steps - 1, np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), mode,
-    )  # fmt: skip
-    scenario = Scenario(
-        ROBOT, ROBOT.q0, v[0], reference, tracking or PoseTask(), DT, reference.duration,
-        Certificate(()),
-    )  # fmt: skip
-    position = np.linalg.norm(translations - targets, axis=1)
-    if tracking is not None:
-        position = np.full(n + 1, np.nan)
-    jacobians = np.tile(np.eye(rows, 7), (n + 1, 1, 1))
-    turned = np.array([reference.placement(each).rotation for each in tau.tolist()])
-    x, x_d = (scenario.embedding.points(turned, p) for p in (translations, targets))
-    return Motion(trace, scenario, translations, position, np.zeros(n + 1), jacobians, x, x_d)
-
-
-def on(reference: Reference, delay: float = 0.0, shift: Array | None = None) -> Place:
-    """On the reference, so late [s] (resting at its start until then), and shifted [m]."""
-    offset = np.zeros(3) if shift is None else shift
-    return lambda t: cast(Array, reference.placement(max(t - delay, 0.0)).translation + offset)
 
 
 def test_the_share_of_the_path_that_is_done() -> None:
@@ -111,7 +36,7 @@ def test_the_share_of_the_path_that_is_done() -> None:
     the half is not the whole.
     """
 
-    def done(reference: Reference, place: Place) -> float:
+    def done(reference: Reference, place: Callable[[float], Array]) -> float:
         return evaluate(of(reference, place))["path_done_share"]
 
     assert done(straight(), on(straight(), 0.5)) == pytest.approx(
@@ -287,57 +212,6 @@ def test_an_orientation_task_has_neither() -> None:
     assert all(math.isnan(got[name]) for name in of_position)
     assert got["contour_error_6d_max_m"] == pytest.approx(0.0, abs=1e-9)
     assert math.isnan(got["lag_max_s"])
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_distances_are_the_least_over_the_curve(seed: int) -> None:
-    """Points about a circle, a figure of eight and a polygon, against minimisation over time."""
-    random = np.random.default_rng(seed)
-    corners = random.uniform(-0.2, 0.2, (6, 3))
-    polygon = Reference(
-        5.0,
-        lambda tau: pin.SE3(
-            np.eye(3),
-            np.array([np.interp(tau, np.arange(6), corners[:, axis]) for axis in range(3)]),
-        ),
-        lambda tau: np.zeros(6),
-    )
-    for reference in (ROUND, EIGHT, polygon):
-        path = reference_path(reference, DT)
-        points = np.array(
-            [reference.placement(tau).translation for tau in random.uniform(0, 4, 12)]
-        )
-        points += random.normal(size=(12, 3)) * random.choice([1e-5, 1e-3, 0.1], size=(12, 1))
-        points[0] = [0.0, 0.0, 0.1]  # the centre of the circle: every point is the nearest
-        expected = [least_distance(reference, point) for point in points]
-        np.testing.assert_allclose(path.distances(points), expected, atol=3e-6)
-
-
-def test_the_nearest_piece_may_end_farther_away_than_many_vertices() -> None:
-    """The middle of a long piece, 1 mm away, among short ones at more than 1.2 mm."""
-    short = np.array([[0.0, 2.2e-3 + 1e-5 * k, 0.0] for k in range(40)])
-    vertices = np.vstack([[[-2.5e-3, 0, 0], [2.5e-3, 0, 0]], short])
-    path = ReferencePath(vertices, len(vertices) - 1)
-    assert path.distances(np.array([[-5e-4, 1e-3, 0.0]])) == pytest.approx(1e-3, abs=1e-12)
-
-
-def least_distance(reference: Reference, point: Array) -> float:
-    """From a point to the curve, by samples and golden sections about the best of them."""
-    instants = np.linspace(0, reference.duration, 1001)
-
-    def away(tau: float) -> float:
-        return float(np.linalg.norm(reference.placement(tau).translation - point))
-
-    best = instants[np.argsort([away(tau) for tau in instants.tolist()])[:8]]
-    step = instants[1]
-    return min(
-        float(
-            minimize_scalar(
-                away, bounds=(tau - step, tau + step), method="bounded", options={"xatol": 1e-9}
-            ).fun
-        )
-        for tau in np.clip(best, step, reference.duration - step).tolist()
-    )
 
 
 def test_recovery_is_timed_from_the_largest_error() -> None:

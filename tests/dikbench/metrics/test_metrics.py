@@ -3,94 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-import pinocchio as pin
 import pytest
+from makers.tip_motions import ELBOW, RADIUS, J, four_steps, tip_scenario, trace_of
 
 from dikbench.metrics import METRICS, evaluate, motion_of
 from dikbench.metrics.distance_and_torque import CONSTRAINTS
-from dikbench.problem.tasks import PoseTask, PositionTask
-from dikbench.robots.loading import load_robot
-from dikbench.scenario import Scenario
-from dikbench.scenario.certificate import Certificate
-from dikbench.scenario.reference.reference import target_at_rest
-from dikbench.simulation.status import STEP_CODE, Status
-from dikbench.simulation.trace import Trace
-
-# --- metrics of a motion made by hand
-#
-# The planar arm at q = (q_1, 90 deg, 0): its tip is at (0.4, 0.5), 0.41^(1/2) m from the base,
-# turned by q_1 and pointing 90 deg to the left. A speed w of joint 1 moves it, in its own axes,
-# with (0.4, 0.5, 1) w; the body Jacobian depends on q_2 and q_3 only.
-
-J = np.array([[0.4, 0.0, 0.0], [0.5, 0.5, 0.2], [1.0, 1.0, 1.0]])
-STEP = J[:, 0]
-RADIUS = math.sqrt(0.41)
-ELBOW = 0.4 / RADIUS  # the end of the first link, at 0.4 m, is the second task's
-
-
-def _scenario() -> Scenario:
-    """Hold tip and elbow where they are at q_1 = 0; limits of 0.05 rad, 1.5 rad/s, 20 rad/s^2."""
-    robot = load_robot("planar3r").with_limits(
-        position=([-0.25, -2, -2], [0.05, 2, 2]), velocity=(-1.5, 4.0), acceleration=20.0
-    )
-    target = pin.SE3(pin.utils.rotate("z", np.pi / 2), np.array([0.4, 0.5, 0.0]))
-    return Scenario(
-        robot=robot,
-        q0=np.array([0.0, np.pi / 2, 0.0]),
-        v0=np.array([0.5, 0.0, 0.0]),
-        reference=target_at_rest(target, 0.4),
-        tracking=PoseTask(gain=1.0),
-        dt=0.1,
-        duration=0.4,
-        certificate=Certificate(()),
-        tasks=(PositionTask(target=np.array([0.4, 0.0, 0.0]), frame="link1", priority=2),),
-    )
-
-
-def _trace(speeds: list[float], wanted: list[list[float]], statuses: list[Status]) -> Trace:
-    """Joint 1 moves at the given speeds from q_1 = 0 on, for 0.1 s each."""
-    n = len(speeds)
-    q = np.zeros((n + 1, 3))
-    q[:, 0] = np.concatenate([[0.0], np.cumsum(speeds)]) * 0.1
-    q[:, 1] = np.pi / 2
-    applied = np.zeros((n, 3))
-    applied[:, 0] = speeds
-    return Trace(
-        dt=0.1,
-        q=q,
-        tau=0.1 * np.arange(n + 1.0),
-        wanted=np.array(wanted).reshape(n, 3),
-        commanded=applied + 100.0,  # nothing may be read off the command
-        applied=applied,
-        status=np.array([STEP_CODE[s] for s in statuses], dtype=int),
-        relaxed=np.array([0, 2, 0, 1][:n], dtype=int),
-        claimed=np.array([1, 0, 1, -1][:n], dtype=int),
-        verified=np.array([1, 0, 0, -1][:n], dtype=int),
-        # Of the last step, at which nothing was solved, no residual counts.
-        primal=np.array([1e-9, 3e-3, 2e-3, 9.0][:n], dtype=float),
-        dual=np.array([np.nan, 1e-3, 2e-3, 9.0][:n], dtype=float),
-        gap=np.array([0.0, 4e-5, 1e-5, 9.0][:n], dtype=float),
-        distance=np.array([0.0, 0.25, 0.125, np.nan][:n]),
-    )
-
-
-def _four_steps() -> dict[str, float]:
-    """q_1 = 0, 0.1, -0.1, -0.2, -0.2: forward, back too fast, back, stopped."""
-    trace = _trace(
-        speeds=[1.0, -2.0, -1.0, 0.0],
-        wanted=[
-            [0.4, 0.5, 1.0],  # done as wanted
-            [0.4, 0.5, 1.0],  # twice as fast, in reverse
-            [-0.8, -1.0, -2.0],  # half of it
-            [0.4, 0.5, 1.0],  # nothing of it
-        ],
-        statuses=[Status.OK, Status.SOLVER_FAILED, Status.NOT_VERIFIED, Status.INFEASIBLE],
-    )
-    return evaluate(motion_of(trace, _scenario()))
+from dikbench.simulation.status import Status
 
 
 def _chord(angle: float) -> float:
@@ -201,7 +122,7 @@ BOTH_ERRORS = [
 )
 def test_every_metric_of_a_motion_made_by_hand(name: str, value: float) -> None:
     """Four steps of the planar arm about its base, with the values of a pocket calculator."""
-    assert _four_steps()[name] == pytest.approx(value, abs=1e-12, nan_ok=True)
+    assert four_steps()[name] == pytest.approx(value, abs=1e-12, nan_ok=True)
 
 
 def test_no_metric_is_left_out_of_the_test_above() -> None:
@@ -214,8 +135,8 @@ def test_no_metric_is_left_out_of_the_test_above() -> None:
 def test_a_slant_of_the_motion_is_its_largest_angle() -> None:
     """Off course by an angle between none and reversal: cosines of hand-weighted twists."""
     # Achieved (0.4, 0.5, 1), weighted (0.4, 0.5, 0.2); wanted the translation alone.
-    trace = _trace([1.0, 1.0], [[0.4, 0.5, 0.0], [0.4, 0.5, 1.0]], [Status.OK, Status.OK])
-    got = evaluate(motion_of(trace, _scenario()))
+    trace = trace_of([1.0, 1.0], [[0.4, 0.5, 0.0], [0.4, 0.5, 1.0]], [Status.OK, Status.OK])
+    got = evaluate(motion_of(trace, tip_scenario()))
     assert got["direction_error_max_rad"] == pytest.approx(math.acos(math.sqrt(0.41 / 0.45)))
     assert got["progress_min"] == pytest.approx(1.0)
     assert got["stuck_share"] == 0.0
@@ -223,82 +144,21 @@ def test_a_slant_of_the_motion_is_its_largest_angle() -> None:
 
 def test_the_smallest_singular_value_is_that_of_the_worst_configuration() -> None:
     """Stretched, the planar arm's is zero, at the last configuration too."""
-    trace = _trace([0.0], [[1.0, 0, 0]], [Status.OK])
+    trace = trace_of([0.0], [[1.0, 0, 0]], [Status.OK])
     trace.q[-1] = 0.0
-    assert evaluate(motion_of(trace, _scenario()))["sigma_min"] == pytest.approx(0.0, abs=1e-12)
+    assert evaluate(motion_of(trace, tip_scenario()))["sigma_min"] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_what_a_step_achieved_is_judged_where_it_began() -> None:
     """The body Jacobian of the configuration before the step, times the velocity applied in it."""
-    trace = _trace([0.0, 0.0], [[1.0, 0, 0]] * 2, [Status.OK] * 2)
+    trace = trace_of([0.0, 0.0], [[1.0, 0, 0]] * 2, [Status.OK] * 2)
     trace.applied[0] = [3.0, -5.0, 0.0]
     trace.applied[1] = [2.0, 0.0, 0.0]
     trace.q[1:, 1] = 0.0
-    motion = motion_of(trace, _scenario())
+    motion = motion_of(trace, tip_scenario())
     assert motion.achieved[0] == pytest.approx(3.0 * J[:, 0] - 5.0 * J[:, 1])
     # Stretched: the tip is 0.9 m straight ahead of the base.
     assert motion.achieved[1] == pytest.approx([0.0, 1.8, 2.0])
-
-
-def test_limits_that_are_not_in_force_are_not_violated() -> None:
-    """Zero, and a ratio that is not defined; the shares of violating steps are zero."""
-    scenario = _scenario()
-    bare = scenario.robot.with_limits(position=None, velocity=None, acceleration=None)
-    trace = _trace([1.0, -2.0], [[0.4, 0.5, 1.0]] * 2, [Status.OK] * 2)
-    got = evaluate(motion_of(trace, replace(scenario, robot=bare)))
-    assert got["position_violation_max_rad"] == 0.0
-    assert got["velocity_violation_max_rad_s"] == 0.0
-    assert got["acceleration_violation_max_rad_s2"] == 0.0
-    assert got["violating_share"] == 0.0
-    assert math.isnan(got["velocity_peak_ratio"])
-
-
-def test_infinite_limits_are_not_violated() -> None:
-    """Nor do they turn a ratio into NaN."""
-    scenario = _scenario()
-    far = scenario.robot.with_limits(position=np.inf, velocity=[np.inf, 1, 1], acceleration=np.inf)
-    trace = _trace([1.0, -2.0], [[0.4, 0.5, 1.0]] * 2, [Status.OK] * 2)
-    got = evaluate(motion_of(trace, replace(scenario, robot=far)))
-    assert got["violating_share"] == 0.0
-    assert got["velocity_peak_ratio"] == 0.0
-    assert got["acceleration_violation_max_rad_s2"] == 0.0
-
-
-def test_a_one_sided_velocity_limit_is_a_ratio_on_its_side() -> None:
-    """A joint that may only move forward, and does, at half its limit."""
-    scenario = _scenario()
-    forward = scenario.robot.with_limits(velocity=([0, -1, -1], 2.0))
-    trace = _trace([1.0], [[0.4, 0.5, 1.0]], [Status.OK])
-    got = evaluate(motion_of(trace, replace(scenario, robot=forward)))
-    assert got["velocity_peak_ratio"] == pytest.approx(0.5)
-    assert got["velocity_violation_max_rad_s"] == 0.0
-
-
-def test_what_a_solver_leaves_is_not_a_violation() -> None:
-    """A limit passed by less than 1e-4 does not make a step violate it; by more it does."""
-    scenario = _scenario()
-    for excess, share in ((1e-12, 0.0), (0.9e-4, 0.0), (1.1e-4, 1.0)):
-        limit = scenario.robot.with_limits(
-            position=([-5, -5, -5], [0.1 - excess, 5, 5]),
-            velocity=1.0 - excess,
-            acceleration=(0.5 - excess) / 0.1,  # from 0.5 to 1 rad/s in a step of 0.1 s
-        )
-        trace = _trace([1.0], [[0.4, 0.5, 1.0]], [Status.OK])
-        got = evaluate(motion_of(trace, replace(scenario, robot=limit)))
-        assert got["violating_share"] == share
-        for kind in ("position", "velocity", "acceleration"):
-            assert got[f"{kind}_violation_share"] == share
-
-
-def test_a_start_outside_a_limit_is_not_a_step_that_violates_it() -> None:
-    """A step answers for where it ends."""
-    scenario = _scenario()
-    limit = scenario.robot.with_limits(position=([0.05, -2, -2], 2.0), velocity=2.0)
-    trace = _trace([1.0], [[0.4, 0.5, 1.0]], [Status.OK])
-    got = evaluate(motion_of(trace, replace(scenario, robot=limit)))
-    assert got["violating_share"] == got["position_violation_share"] == 0.0
-    assert got["position_violation_integral_rad_s"] == 0.0
-    assert got["position_violation_max_rad"] == pytest.approx(0.05)
 
 
 NEED_MORE = {
@@ -320,15 +180,15 @@ NEED_MORE = {
 @pytest.mark.parametrize("name", METRICS)
 def test_one_step_defines_every_metric_that_does_not_need_more(name: str) -> None:
     """The shortest run that there is."""
-    trace = _trace([1.0], [[0.4, 0.5, 1.0]], [Status.OK])
+    trace = trace_of([1.0], [[0.4, 0.5, 1.0]], [Status.OK])
     trace.dual[0] = 0.0
-    assert math.isnan(evaluate(motion_of(trace, _scenario()))[name]) == (name in NEED_MORE)
+    assert math.isnan(evaluate(motion_of(trace, tip_scenario()))[name]) == (name in NEED_MORE)
 
 
 def test_no_step_leaves_what_it_cannot_define() -> None:
     """A trial that ended at step 0: errors at the start, no travel, NaN for shares and progress."""
-    trace = _trace([], [], [])
-    got = evaluate(motion_of(trace, _scenario()))
+    trace = trace_of([], [], [])
+    got = evaluate(motion_of(trace, tip_scenario()))
     assert list(got) == list(METRICS)
     for name, value in got.items():
         defined = ("error" in name and "direction" not in name) or name in {
@@ -343,8 +203,8 @@ def test_no_step_leaves_what_it_cannot_define() -> None:
 
 def test_a_run_that_only_dwells_has_no_progress() -> None:
     """Nothing was wanted at any step: NaN, and no warning about empty means."""
-    trace = _trace([0.0, 0.0], [[0.0, 0.0, 0.0]] * 2, [Status.OK] * 2)
-    got = evaluate(motion_of(trace, _scenario()))
+    trace = trace_of([0.0, 0.0], [[0.0, 0.0, 0.0]] * 2, [Status.OK] * 2)
+    got = evaluate(motion_of(trace, tip_scenario()))
     assert math.isnan(got["progress_mean"])
     assert math.isnan(got["progress_min"])
     assert math.isnan(got["direction_error_max_rad"])
@@ -352,46 +212,8 @@ def test_a_run_that_only_dwells_has_no_progress() -> None:
 
 def test_a_run_that_stands_still_makes_no_progress() -> None:
     """Progress 0, no direction: stopped is not on course."""
-    trace = _trace([0.0, 0.0], [[0.4, 0.5, 1.0]] * 2, [Status.STUCK] * 2)
-    got = evaluate(motion_of(trace, _scenario()))
+    trace = trace_of([0.0, 0.0], [[0.4, 0.5, 1.0]] * 2, [Status.STUCK] * 2)
+    got = evaluate(motion_of(trace, tip_scenario()))
     assert got["progress_mean"] == 0.0
     assert math.isnan(got["direction_error_max_rad"])
     assert got["stuck_share"] == 1.0
-
-
-@pytest.mark.parametrize("name", METRICS)
-def test_metrics_say_what_they_are(name: str) -> None:
-    """A direction, a worst value on its side, one line."""
-    metric = METRICS[name]
-    assert metric.name == name
-    assert "\n" not in metric.definition
-    value = _four_steps()[name]
-    sign = 1 if metric.best == "low" else -1
-    assert math.isnan(value) or sign * metric.worst >= sign * value
-
-
-UNITS = {
-    "_m": {"m"}, "_rad": {"rad"}, "_rad_s": {"rad/s", "rad s"}, "_rad_s2": {"rad/s^2"},
-    "_s": {"s"}, "_per_s": {"1/s"}, "": {""},
-}  # fmt: skip
-"""What the ends of names say of units."""
-
-
-@pytest.mark.parametrize("name", METRICS)
-def test_the_unit_of_a_metric_is_that_at_the_end_of_its_name(name: str) -> None:
-    """None where the name ends without one; the longest end counts: `_rad_s`, not `_s`."""
-    end = max((suffix for suffix in UNITS if name.endswith(suffix)), key=len)
-    assert METRICS[name].unit in UNITS[end]
-
-
-@pytest.mark.parametrize("quantity", ["position", "velocity", "acceleration"])
-def test_the_unit_of_a_time_integral_is_a_second_more(quantity: str) -> None:
-    """Of `rad/s` it is `rad`."""
-    units = {
-        kind: metric.unit
-        for kind in ("max", "integral")
-        for name, metric in METRICS.items()
-        if name.startswith(f"{quantity}_violation_{kind}")
-    }
-    times_second = {"rad": "rad s", "rad/s": "rad", "rad/s^2": "rad/s"}
-    assert units["integral"] == times_second[units["max"]]

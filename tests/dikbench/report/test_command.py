@@ -61,9 +61,13 @@ BROKEN = {"ok": "success", "skipped": ""}
         ({"pinv": ["crashed", "timeout"], "dls": ["timeout", "crashed"]}, "`pinv` in 2 of 2"),
         ({"pinv": ["skipped", "skipped"], "dls": ["skipped", "skipped"]}, "No formulation was run"),
         ({"pinv": ["timeout", "skipped"], "dls": ["ok", "skipped"]}, "`pinv` in 1 of 1 trials"),
-        ({"dls": ["ok", "ok"]}, "that a known motion can do"),
+        pytest.param({"dls": ["ok", "ok"]}, "that a known motion can do", marks=pytest.mark.long),
         ({"dls": ["ok", "crashed"]}, "`dls` in 1 of 2 trials (1 crashed)"),
-        ({"dls": ["crashed", "crashed"]}, "`dls` in 2 of 2 trials (2 crashed)"),
+        pytest.param(
+            {"dls": ["crashed", "crashed"]},
+            "`dls` in 2 of 2 trials (2 crashed)",
+            marks=pytest.mark.long,
+        ),
         ({"dls": ["skipped", "skipped"]}, "No formulation was run"),
     ],
 )

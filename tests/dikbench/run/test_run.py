@@ -1,4 +1,4 @@
-"""A run from the plan to the report, in real worker processes."""
+"""A run from the plan to the report, and what workers make of laws that misbehave."""
 
 from __future__ import annotations
 

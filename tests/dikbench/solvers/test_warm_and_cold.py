@@ -30,11 +30,11 @@ PAIRS = [("qp", name) for name in ("osqp", "clarabel", "piqp", "proxqp", "daqp",
 PAIRS += [("lp-alpha", name) for name in ("osqp", "clarabel", "piqp", "daqp")]
 
 CASES = [
-    pytest.param(law, name, scenario, marks=() if (pair + number) % 9 == 0 else pytest.mark.long)
+    pytest.param(law, name, scenario, marks=() if (pair + number) % 18 == 0 else pytest.mark.long)
     for pair, (law, name) in enumerate(PAIRS)
     for number, scenario in enumerate(load_study("quick").scenarios)
 ]
-"""Every pair on every scenario; the normal run has a ninth of them, in turns."""
+"""Every pair on every scenario; the normal run has an eighteenth of them, in turns."""
 
 
 class _Kept:

@@ -16,6 +16,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from click.testing import CliRunner, Result
+from makers.commands import hear_ctrl_c
 
 from dikbench.arrays import Array
 from dikbench.cli import commands
@@ -187,6 +188,7 @@ def test_serving_ends_with_an_interrupt(runs: Path) -> None:
         env={**os.environ, "BROWSER": "true"},
         stdout=subprocess.PIPE,
         text=True,
+        preexec_fn=hear_ctrl_c,
     )
     assert process.stdout is not None
     try:

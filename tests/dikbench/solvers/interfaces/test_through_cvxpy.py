@@ -5,8 +5,6 @@ from __future__ import annotations
 import subprocess
 import sys
 
-import pytest
-
 CODE = """
 import numpy as np
 from dikbench.errors import SolverFailed
@@ -25,7 +23,6 @@ except SolverFailed:
 
 def test_a_warning_beside_an_inaccurate_answer_is_silenced() -> None:
     """A step that fails is a row of results; a line on the terminal beside each would drown it."""
-    pytest.importorskip("scs")
     command = [sys.executable, "-W", "always::UserWarning", "-c", CODE]
     found = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)
     assert found.stdout == "failed\n"
