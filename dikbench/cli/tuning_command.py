@@ -82,7 +82,7 @@ def tune(
 
     chosen = [in_declared_order("formulation", text) for text in formulations] or tunable()
     command = shlex.join(["dikbench", *sys.argv[1:]])
-    settings = RunSettings(jobs or available_cores(), traces="none", engine="lockstep")
+    settings = RunSettings(jobs or available_cores(), traces="none")
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a stop like Ctrl-C
     found = []
     try:
