@@ -10,7 +10,8 @@ from dikbench.arrays import Array, Indices
 from dikbench.errors import DikbenchError
 from dikbench.metrics.motion import Motion
 from dikbench.problem.tasks.rows import orientation_error
-from dikbench.robots.kinematics import Kinematics, placements
+from dikbench.robots.kinematics import Kinematics
+from dikbench.robots.many_kinematics import ManyKinematics
 from dikbench.scenario.scenario import REST_ROUNDING_S, Scenario
 from dikbench.simulation.trace import Trace
 
@@ -91,15 +92,16 @@ def _motion(
     for k in missing.tolist():
         kinematics.update(trace.q[k])
         J[k] = kinematics.task_jacobian(rows)
-    X = placements(robot, robot.frame_id, trace.q)
-    made = X[:, :3, :3], X[:, :3, 3]
+    frame = ManyKinematics(robot)
+    frame.place(trace.q)
+    made = frame.rotations, frame.translations
     targets = target_rotations, target_translations
     points, target_points = scenario.points_at(trace.tau, made, targets)
-    position, orientation = _errors(scenario, X, target_rotations, target_translations)
+    position, orientation = _errors(scenario, *made, *targets)
     return Motion(
         trace=trace,
         scenario=scenario,
-        translations=X[:, :3, 3],
+        translations=frame.translations,
         position_error=position,
         orientation_error=orientation,
         jacobians=J,
@@ -126,7 +128,7 @@ def _part(whole: Motion, first: int, trace: Trace) -> Motion:
 
 
 def _errors(
-    scenario: Scenario, X: Array, target_rotations: Array, target_translations: Array
+    scenario: Scenario, R: Array, p: Array, target_rotations: Array, target_translations: Array
 ) -> tuple[Array, Array]:
     """Compute the errors of position [m] and orientation [rad] at each instant, (n + 1,) each.
 
@@ -135,9 +137,9 @@ def _errors(
     """
     robot, rows = scenario.robot, scenario.rows
     linear, angular = [row for row in rows if row < 3], [row - 3 for row in rows if row >= 3]
-    nothing = np.full(len(X), np.nan)
+    nothing = np.full(len(R), np.nan)
     position, orientation = nothing, nothing
-    R, away = X[:, :3, :3], target_translations - X[:, :3, 3]
+    away = target_translations - p
     in_space = 2 in robot.movable_rows
     if linear:
         if len(linear) < 3 and in_space and robot.task_axes == "body":
