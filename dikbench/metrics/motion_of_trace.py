@@ -93,7 +93,8 @@ def _motion(
         kinematics.update(trace.q[k])
         J[k] = kinematics.task_jacobian(rows)
     frame = ManyKinematics(robot)
-    frame.place(trace.q)
+    with np.errstate(invalid="ignore"):  # a run that diverged is not finite
+        frame.place(trace.q)
     made = frame.rotations, frame.translations
     targets = target_rotations, target_translations
     points, target_points = scenario.points_at(trace.tau, made, targets)
