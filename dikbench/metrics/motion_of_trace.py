@@ -10,8 +10,7 @@ from dikbench.arrays import Array, Indices
 from dikbench.errors import DikbenchError
 from dikbench.metrics.motion import Motion
 from dikbench.problem.tasks.rows import orientation_error
-from dikbench.robots.kinematics import Kinematics
-from dikbench.robots.many_kinematics import ManyKinematics
+from dikbench.robots.kinematics import Kinematics, placements
 from dikbench.scenario.scenario import REST_ROUNDING_S, Scenario
 from dikbench.simulation.trace import Trace
 
@@ -92,17 +91,15 @@ def _motion(
     for k in missing.tolist():
         kinematics.update(trace.q[k])
         J[k] = kinematics.task_jacobian(rows)
-    frame = ManyKinematics(robot)
-    with np.errstate(invalid="ignore"):  # a run that diverged is not finite
-        frame.place(trace.q)
-    made = frame.rotations, frame.translations
+    X = placements(robot, robot.frame_id, trace.q)
+    made = X[:, :3, :3], X[:, :3, 3]
     targets = target_rotations, target_translations
     points, target_points = scenario.points_at(trace.tau, made, targets)
-    position, orientation = _errors(scenario, *made, *targets)
+    position, orientation = _errors(scenario, X, target_rotations, target_translations)
     return Motion(
         trace=trace,
         scenario=scenario,
-        translations=frame.translations,
+        translations=X[:, :3, 3],
         position_error=position,
         orientation_error=orientation,
         jacobians=J,
@@ -129,7 +126,7 @@ def _part(whole: Motion, first: int, trace: Trace) -> Motion:
 
 
 def _errors(
-    scenario: Scenario, R: Array, p: Array, target_rotations: Array, target_translations: Array
+    scenario: Scenario, X: Array, target_rotations: Array, target_translations: Array
 ) -> tuple[Array, Array]:
     """Compute the errors of position [m] and orientation [rad] at each instant, (n + 1,) each.
 
@@ -138,9 +135,9 @@ def _errors(
     """
     robot, rows = scenario.robot, scenario.rows
     linear, angular = [row for row in rows if row < 3], [row - 3 for row in rows if row >= 3]
-    nothing = np.full(len(R), np.nan)
+    nothing = np.full(len(X), np.nan)
     position, orientation = nothing, nothing
-    away = target_translations - p
+    R, away = X[:, :3, :3], target_translations - X[:, :3, 3]
     in_space = 2 in robot.movable_rows
     if linear:
         if len(linear) < 3 and in_space and robot.task_axes == "body":

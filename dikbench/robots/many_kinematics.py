@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.arrays import Array
-from dikbench.robots.kinematics import Kinematics, placements
+from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.robot import Robot
 
 ENTRY_ROUNDING: Final = 1e-15
@@ -75,29 +75,17 @@ class ManyKinematics:
         else:
             self._all_at_once(q, self._chain)
 
-    def place(self, q: Array) -> None:
-        """Compute the placements alone, for configurations q, (N, nq)."""
-        if self._chain is None:
-            placed = placements(self._robot, self._robot.frame_id, q)
-            self.rotations, self.translations = placed[:, :3, :3], placed[:, :3, 3]
-        else:
-            self._placed_all(q, self._chain)
-
     def _row_by_row(self, q: Array) -> None:
         kinematics, frame = self._kinematics, self._robot.frame_id
-        placed, jacobians = np.empty((len(q), 4, 4)), np.empty((len(q), 6, self._robot.nv))
+        placements, jacobians = np.empty((len(q), 4, 4)), np.empty((len(q), 6, self._robot.nv))
         for k, row in enumerate(q):
             kinematics.update(row)
-            placed[k] = kinematics.placement(frame).homogeneous
+            placements[k] = kinematics.placement(frame).homogeneous
             jacobians[k] = kinematics.jacobian(frame)
-        self.rotations, self.translations = placed[:, :3, :3], placed[:, :3, 3]
+        self.rotations, self.translations = placements[:, :3, :3], placements[:, :3, 3]
         self.jacobians = jacobians
 
-    def _placed_all(self, q: Array, chain: _Chain) -> tuple[list[Array], Array, Array, Array]:
-        """Compute the placements: columns and origin of the frame, axes and origins of the joints.
-
-        They are (3, N) each, and (n, 3, N).
-        """
+    def _all_at_once(self, q: Array, chain: _Chain) -> None:
         count, number = len(q), len(chain.joints)
         # The rows are the last axis here, so that each operation runs through memory in order.
         columns, p = _columns_of_identity(count), np.zeros((3, count))
@@ -114,26 +102,22 @@ class ManyKinematics:
             else:
                 p = p + q[:, joint.q] * z
             axes[k], origins[k] = z, p
-        columns, p = _placed(columns, p, chain.rotation, chain.translation)
-        self.rotations = np.stack(columns, axis=1).transpose(2, 0, 1).copy()
-        self.translations = p.T.copy()
-        return columns, p, axes, origins
-
-    def _all_at_once(self, q: Array, chain: _Chain) -> None:
-        columns, p, axes, origins = self._placed_all(q, chain)
+        (x, y, z), p = _placed(columns, p, chain.rotation, chain.translation)
         arms = p - origins
-        jacobians = np.zeros((6, self._robot.nv, len(q)))
+        jacobians = np.zeros((6, self._robot.nv, count))
         turning = [joint.turns for joint in chain.joints]
         linear = axes if not any(turning) else _cross(axes, arms)
         if not all(turning):
             linear[~np.array(turning)] = axes[~np.array(turning)]
-        for row, side in enumerate(columns):
+        for row, side in enumerate((x, y, z)):
             along = _dot(side, linear)
             about = _dot(side, axes)
             for k, joint in enumerate(chain.joints):
                 jacobians[row, joint.v] = along[k]
                 if joint.turns:
                     jacobians[3 + row, joint.v] = about[k]
+        self.rotations = np.stack([x, y, z], axis=1).transpose(2, 0, 1).copy()
+        self.translations = p.T.copy()
         self.jacobians = jacobians.transpose(2, 0, 1).copy()
 
 
