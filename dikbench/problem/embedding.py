@@ -86,7 +86,8 @@ class Embedding:
         """
         parts = [translations @ self.linear.T]
         if self.scale:
-            turned = self.left @ (rotations @ self.right)
+            whole = self.left is self.right  # the identity, of a task on the whole orientation
+            turned = rotations if whole else self.left @ (rotations @ self.right)
             if self.of_one_turn:
                 cosine = turned[:, 0, 0] + turned[:, 1, 1]
                 sine = turned[:, 1, 0] - turned[:, 0, 1]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Final
 
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building_together import make_scenarios
@@ -34,9 +33,6 @@ from dikbench.simulation.lockstep import (
 from dikbench.simulation.status import Status
 from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER
 from dikbench.study.trial import Trial
-
-MOST_ROWS: Final = 512
-"""So many trials are in lockstep at most: more are hardly faster, and need their memory."""
 
 
 class BlockEnded(Exception):
@@ -86,16 +82,14 @@ def work_together(
             groups.setdefault(kind, []).append((number, found))
     together: list[tuple[int, Prepared, LockstepRun]] = []
     for group in groups.values():
-        for start in range(0, len(group), MOST_ROWS):
-            part = group[start : start + MOST_ROWS]
-            try:
-                found_runs = _in_lockstep([ready for _, ready in part])
-            except BaseException as error:
-                if len(trials) > 1:  # who it was is found out in smaller blocks
-                    raise BlockEnded(f"{type(error).__name__}: {error}") from None
-                alone += part  # which says what is wrong of it
-                continue
-            together += [(*each, run) for each, run in zip(part, found_runs, strict=True)]
+        try:
+            found_runs = _in_lockstep([ready for _, ready in group])
+        except BaseException as error:
+            if len(trials) > 1:  # who it was is found out in smaller blocks
+                raise BlockEnded(f"{type(error).__name__}: {error}") from None
+            alone += group  # which says what is wrong of it
+            continue
+        together += [(*each, run) for each, run in zip(group, found_runs, strict=True)]
     made = rows_of(  # those of one scenario are measured together
         [ready for _, ready, _ in together],
         [each.run for _, _, each in together],

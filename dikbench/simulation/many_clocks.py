@@ -59,11 +59,14 @@ class ManyTimeClocks:
     def __init__(self, scenarios: Sequence[Scenario]) -> None:
         self.most_steps: Sequence[int] = [scenario.steps for scenario in scenarios]
         self._step, self._dt = 0, scenarios[0].dt
-        self._rows, self._left = np.arange(len(scenarios)), np.array(self.most_steps)
-        count, most = len(scenarios), max(self.most_steps)
+        own = {id(scenario): scenario for scenario in scenarios}  # of several trials each
+        places = {name: place for place, name in enumerate(own)}
+        self._rows = np.array([places[id(scenario)] for scenario in scenarios])
+        self._left = np.array(self.most_steps)
+        count, most = len(own), max(self.most_steps)
         self._rotations = np.empty((most, count, 3, 3))
         self._translations, self._twists = np.empty((most, count, 3)), np.empty((most, count, 6))
-        for row, scenario in enumerate(scenarios):
+        for row, scenario in enumerate(own.values()):
             rotations, translations = scenario.target_arrays
             n = scenario.steps
             self._rotations[:n, row], self._translations[:n, row] = rotations[:n], translations[:n]

@@ -9,12 +9,8 @@ from typing import Final
 import msgspec
 
 from dikbench.errors import DikbenchError
-from dikbench.plugins.building import (
-    make_formulation,
-    make_plant,
-    make_scenario,
-    scenario_parameters,
-)
+from dikbench.plugins.building import make_formulation, make_plant, scenario_parameters
+from dikbench.plugins.building_together import make_scenarios
 from dikbench.plugins.drawing import Cell
 from dikbench.problem.problem import Formulation, program_of
 from dikbench.scenario.oracle import ORACLE, ORACLES
@@ -122,12 +118,16 @@ def _in_order(
 
 
 def _check_scenarios(study: Study, scenarios: Sequence[Selector]) -> None:
-    for number, scenario in enumerate(scenarios):
+    """Build the first scenarios, and check the parameters of the others."""
+    first, others = scenarios[:SCENARIOS_BUILT_FIRST], scenarios[SCENARIOS_BUILT_FIRST:]
+    built = make_scenarios((scenario, study.seeds[0]) for scenario in first)
+    for scenario, found in zip(first, built, strict=True):
         with naming(scenario, study.name):
-            if number < SCENARIOS_BUILT_FIRST:
-                make_scenario(scenario, study.seeds[0])
-            else:
-                scenario_parameters(scenario)
+            if isinstance(found, BaseException):
+                raise found
+    for scenario in others:
+        with naming(scenario, study.name):
+            scenario_parameters(scenario)
 
 
 def _check_timing(study: Study) -> None:
