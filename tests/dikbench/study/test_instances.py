@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import pytest
 from hypothesis import given, settings
@@ -236,11 +236,20 @@ def test_a_fraction_is_the_first_numbers(fraction: float, number: int) -> None:
     assert numbers_of(study) == range(100, 100 + number)
 
 
-@pytest.mark.parametrize("split", ["train", "test"])
-def test_the_shipped_splits_draw_every_family_that_may_be_drawn(split: str) -> None:
+NOT_TUNED_ON: Final = {
+    *("joint-limit-crossing", "joint-limit-approach", "workspace-boundary", "self-collision"),
+    *("hexagon", "back-and-forth"),
+}
+"""Families of which no motion is known that does the task, and two of very long runs."""
+
+
+@pytest.mark.parametrize(("split", "without"), [("train", NOT_TUNED_ON), ("test", set())])
+def test_the_shipped_splits_draw_every_family_that_may_be_drawn(
+    split: str, without: set[str]
+) -> None:
     """Numbers from the beginning of their split."""
     study = load_study(split)
-    assert sorted(study.scenarios) == DRAWN
+    assert sorted(study.scenarios) == sorted({*DRAWN} - without)
     assert study.split == split
     assert numbers_of(study)[0] == SPLITS[split].start
 

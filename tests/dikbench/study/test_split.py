@@ -32,7 +32,7 @@ def test_a_seed_has_the_split_of_its_number_at_any_attempt() -> None:
 
 
 def test_the_shipped_studies_share_no_instance() -> None:
-    """Nor a seed; they have the same families."""
+    """Nor a seed; what is tuned on is also reported on."""
     cells: dict[str, set[tuple[str, int]]] = {}
     for name in ("train", "test"):
         study = load_study(name)
@@ -41,7 +41,7 @@ def test_the_shipped_studies_share_no_instance() -> None:
         cells[name] = {(str(p.trial.scenario), p.trial.seed) for p in expand(few)}
         assert {split_of(seed) for _, seed in cells[name]} == {name}
     assert not cells["train"] & cells["test"]
-    assert load_study("train").scenarios == load_study("test").scenarios
+    assert {*load_study("train").scenarios} <= {*load_study("test").scenarios}
 
 
 def _changed(**changes: object) -> Study:
