@@ -112,7 +112,7 @@ def study_options(command: Callable[..., None]) -> Callable[..., None]:
 def _selected(study: str | None, axes: dict[str, Any], out: Path | None) -> tuple[Any, Path]:
     """Return the study that the options select, and its results folder."""
     from dikbench.cli.running import results_folder, selected
-    from dikbench.study.study import Selection
+    from dikbench.study.selection import Selection
 
     chosen = selected(study, Selection(**axes))
     return chosen, results_folder(chosen, out)

@@ -19,14 +19,8 @@ from dikbench.run.in_workers import RunSettings
 from dikbench.run.pool import available_cores
 from dikbench.run.trial_row import TracePolicy
 from dikbench.scenario.plant import REFERENCE_MODES
-from dikbench.study.study import (
-    DEFAULT_STUDY,
-    Selection,
-    Study,
-    folder_of,
-    load_study,
-    select,
-)
+from dikbench.study.selection import Selection, select
+from dikbench.study.study import DEFAULT_STUDY, Study, folder_of, load_study
 
 Selectors = str | Iterable[str]
 

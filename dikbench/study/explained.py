@@ -17,6 +17,8 @@ VALID: Final[Mapping[str, str]] = MappingProxyType(
         'solvers = ["daqp"]',
         "cells.formulations": 'a list of formulations, such as ["dls", "qp"]',
         "cells.solvers": 'a list of solvers, such as ["osqp", "daqp"]',
+        "cells.scenarios": "a list of scenarios, in place of those of the study",
+        "cells.plants": "a list of plants, in place of those of the study",
         "scenarios": 'a list of scenarios, such as ["reach", "near-miss[miss=0.02]"]',
         "plants": 'a list of plants, such as ["ideal"]',
         "references": 'a list of "time" and "path"',

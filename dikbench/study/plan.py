@@ -19,7 +19,7 @@ from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, parse_solver, w
 from dikbench.study.identity import trial_id
 from dikbench.study.instances import accepted, draw_missing, numbers_of
 from dikbench.study.split import check_split
-from dikbench.study.study import Study, naming
+from dikbench.study.study import Cells, Study, naming
 from dikbench.study.trial import NO_SOLVER, Trial
 
 SCENARIOS_BUILT_FIRST: Final = 40
@@ -59,34 +59,30 @@ def expand(
         DikbenchError: on the first selector that does not name anything valid, or an instance that
             cannot be drawn.
     """
-    scenarios = [parse_selector(text) for text in study.scenarios]
-    for plant in map(parse_selector, study.plants):
+    for plant in map(parse_selector, [*study.plants, *(p for c in study.cells for p in c.plants)]):
         with naming(plant, study.name):
             make_plant(plant)
     _check_timing(study)
-    columns: list[tuple[Selector, list[tuple[Selector, str]]]] = [
-        (formulation, _solvers_for(study, formulation, cells.solvers))
+    columns: list[tuple[Cells, Selector, list[tuple[Selector, str]]]] = [
+        (cells, formulation, _solvers_for(study, formulation, cells.solvers))
         for cells in study.cells
         for formulation in map(parse_selector, cells.formulations)
     ]
-    if study.instances:
-        numbers_of(study)
-        drawn = draw(study)
-    else:
-        _check_scenarios(study, scenarios)
-        drawn = list(itertools.product(scenarios, study.seeds))
-    if study.split:
-        check_split(study.name, study.split, [seed for _, seed in drawn])
+    drawn = _drawn(study, draw)
     planned: dict[str, PlannedTrial] = {}
-    for formulation, solvers in columns:
+    for cells, formulation, solvers in columns:
         plants, references = (
             chosen or asked
             for chosen, asked in zip(
-                ways_of(formulation.name), (study.plants, study.references), strict=True
+                ways_of(formulation.name),
+                (cells.plants or study.plants, study.references),
+                strict=True,
             )
         )
         for solver, skip in solvers:
-            for (scenario, seed), plant, reference in _in_order(drawn, plants, references):
+            for (scenario, seed), plant, reference in _in_order(
+                drawn[cells.scenarios or study.scenarios], plants, references
+            ):
                 trial = Trial(formulation, scenario, solver, plant, reference, seed)
                 name = trial_id(trial)
                 planned.setdefault(name, PlannedTrial(name, trial, skip))
@@ -115,6 +111,28 @@ def _in_order(
             map(parse_selector, plants), references, list(cells)
         ):
             yield cell, plant, reference
+
+
+def _drawn(
+    study: Study, draw: Callable[[Study], Sequence[Cell]]
+) -> dict[tuple[str, ...], Sequence[Cell]]:
+    """Return selector and seed of the scenarios of a study, and of those of its cells.
+
+    Raises:
+        DikbenchError: if one cannot be built or drawn, or is of another split.
+    """
+    found: dict[tuple[str, ...], Sequence[Cell]] = {}
+    for texts in (study.scenarios, *(cells.scenarios for cells in study.cells if cells.scenarios)):
+        if study.instances:
+            numbers_of(study)
+            found[texts] = draw(msgspec.structs.replace(study, scenarios=texts))
+        else:
+            scenarios = [parse_selector(text) for text in texts]
+            _check_scenarios(study, scenarios)
+            found[texts] = list(itertools.product(scenarios, study.seeds))
+        if study.split:
+            check_split(study.name, study.split, [seed for _, seed in found[texts]])
+    return found
 
 
 def _check_scenarios(study: Study, scenarios: Sequence[Selector]) -> None:

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Final, Literal
 
 import msgspec
 
@@ -25,7 +25,6 @@ from dikbench.scenario.oracle import ORACLES
 from dikbench.selector import Selector, alternatives, parse_selector
 from dikbench.solvers.catalogue.back_ends import (
     BACK_ENDS,
-    DEFAULT_SOLVER,
     is_installed,
     parse_solver,
 )
@@ -51,10 +50,18 @@ Names = Annotated[tuple[str, ...], NOT_EMPTY]
 
 
 class Cells(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Formulations and the solvers with which each is run (none where none is needed)."""
+    """Formulations, and with what each is run.
+
+    Attributes:
+        formulations: their selectors.
+        solvers: the solvers of those that need one; empty: the default one.
+        scenarios, plants: in place of those of the study; empty: those.
+    """
 
     formulations: Names
     solvers: tuple[str, ...] = ()
+    scenarios: tuple[str, ...] = ()
+    plants: tuple[str, ...] = ()
 
 
 class TimingSettings(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -136,14 +143,14 @@ def load_study(name_or_file: str) -> Study:
         raise DikbenchError(f"study {path}: not valid TOML: {error}") from None
     try:
         spread = _spread(msgspec.structs.replace(study, name=study.name or path.stem))
-        _check_instances(spread)
+        check_instances(spread)
     except DikbenchError as error:
         raise DikbenchError(f"study {path}: {error}") from None
     _check_values(spread, path)
     return spread
 
 
-def _check_instances(study: Study) -> None:
+def check_instances(study: Study) -> None:
     """Check that what excludes instances is not given with them.
 
     Raises:
@@ -169,8 +176,10 @@ def _check_values(study: Study, path: Path) -> None:
     }
     named = [(axis, text, makers[axis]) for axis in makers for text in getattr(study, axis)]
     for number, cell in enumerate(study.cells):
+        for axis, make in makers.items():
+            named += [(f"cells[{number}].{axis}", text, make) for text in getattr(cell, axis)]
         for text in cell.formulations:
-            named.append((f"cells[{number}].formulations", text, _program_of))
+            named.append((f"cells[{number}].formulations", text, program_named))
         for text in cell.solvers:
             named.append((f"cells[{number}].solvers", text, _check_solver))
     for where, text, make in named:
@@ -184,21 +193,21 @@ def _spread(study: Study) -> Study:
     """Return the study with one value per parameter in each selector (see `alternatives`)."""
     timing, example = study.timing, study.example
     if timing is not None:
-        timing = msgspec.structs.replace(timing, scenarios=_each("scenarios", timing.scenarios))
+        timing = msgspec.structs.replace(timing, scenarios=each_of("scenarios", timing.scenarios))
     return msgspec.structs.replace(
         study,
         cells=tuple(
-            Cells(_each("formulations", c.formulations), _each("solvers", c.solvers))
-            for c in study.cells
+            Cells(*(each_of(axis, getattr(cell, axis)) for axis in Cells.__struct_fields__))
+            for cell in study.cells
         ),
-        scenarios=_each("scenarios", study.scenarios),
-        plants=_each("plants", study.plants),
+        scenarios=each_of("scenarios", study.scenarios),
+        plants=each_of("plants", study.plants),
         example=str(in_declared_order("scenario", example)) if example else "",
         timing=timing,
     )
 
 
-def _each(axis: str, selectors: Iterable[str]) -> tuple[str, ...]:
+def each_of(axis: str, selectors: Iterable[str]) -> tuple[str, ...]:
     """List the selectors that those of an axis stand for, each once, in canonical form."""
     found: dict[str, None] = {}
     for given in selectors:
@@ -238,83 +247,7 @@ def folder_of(study: Study) -> str:
     return f"{SELECTED}-{digest(msgspec.json.encode(study).decode())[:DIGITS]}"
 
 
-class Selection(msgspec.Struct, frozen=True):
-    """Replacements of the axes of a study; an empty axis keeps the study's own.
-
-    Attributes:
-        instances: number of instances of each scenario, in place of seeds; 0: the study's own.
-        fraction: the share of them that is run.
-    """
-
-    formulations: tuple[str, ...] = ()
-    scenarios: tuple[str, ...] = ()
-    solvers: tuple[str, ...] = ()
-    seeds: tuple[int, ...] = ()
-    plants: tuple[str, ...] = ()
-    references: tuple[str, ...] = ()
-    instances: int = 0
-    fraction: float = 1.0
-
-
-def select(base: Study, selection: Selection, *, named: bool) -> Study:
-    """Return a study with some of its axes replaced.
-
-    Without solvers in the selection, a formulation has the solvers that a named study has for it,
-    else the default solver.
-
-    Args:
-        base: the study to start from.
-        selection: what replaces its axes.
-        named: whether the user named the study.
-    """
-    if selection == Selection():
-        return base
-    selection = msgspec.structs.replace(
-        selection,
-        **{axis: _each(axis, getattr(selection, axis)) for axis in (*KIND_OF_AXIS, "solvers")},
-    )
-    cells = base.cells
-    if selection.formulations:
-        chosen = map(parse_selector, selection.formulations)
-        cells = tuple(_cells_for(base, formulation, named) for formulation in chosen)
-    if selection.solvers:
-        cells = tuple(msgspec.structs.replace(c, solvers=selection.solvers) for c in cells)
-    changes: dict[str, Any] = {
-        axis: getattr(selection, axis)
-        for axis in ("scenarios", "seeds", "plants", "references")
-        if getattr(selection, axis)
-    }
-    if selection.seeds and selection.instances:
-        raise DikbenchError("instances have seeds of their own; valid: instances or seeds")
-    if selection.seeds:
-        changes["instances"] = 0
-    if selection.instances:
-        changes |= {"instances": selection.instances, "seeds": (0,), "timing": None}
-    if selection.fraction != 1.0:
-        changes["fraction"] = selection.fraction
-    if base.example not in (selection.scenarios or base.scenarios):
-        changes["example"] = ""
-    if base.timing is not None and selection.scenarios and not selection.instances:
-        changes["timing"] = msgspec.structs.replace(base.timing, scenarios=())
-    if not named:
-        changes |= {"name": SELECTED, "description": "Selected on the command line"}
-    made = msgspec.structs.replace(base, cells=cells, **changes)
-    _check_instances(made)
-    return made
-
-
-def _cells_for(base: Study, formulation: Selector, named: bool) -> Cells:
-    program = _program_of(formulation)
-    if program is None:
-        return Cells((str(formulation),))
-    if named:
-        for cell in base.cells:
-            if formulation.name in {parse_selector(text).name for text in cell.formulations}:
-                return Cells((str(formulation),), cell.solvers)
-    return Cells((str(formulation),), (DEFAULT_SOLVER[program],))
-
-
-def _program_of(formulation: str | Selector) -> ProgramKind | None:
+def program_named(formulation: str | Selector) -> ProgramKind | None:
     """Return what a formulation needs a solver for; the oracles need none."""
     if parse_selector(formulation).name in ORACLES:
         return None

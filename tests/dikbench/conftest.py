@@ -10,7 +10,8 @@ from makers.shared import made_once
 
 from dikbench.report.write import write_report
 from dikbench.run.in_workers import RunSettings
-from dikbench.study.study import Selection, load_study, select
+from dikbench.study.selection import Selection, select
+from dikbench.study.study import load_study
 
 
 @pytest.fixture(scope="session")

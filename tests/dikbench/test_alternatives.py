@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from dikbench.errors import DikbenchError
 from dikbench.selector import alternatives
-from dikbench.study.study import Selection, load_study, select
+from dikbench.study.selection import Selection, select
+from dikbench.study.study import load_study
 
 STUDY = """
 description = "sweeps"

@@ -13,7 +13,8 @@ from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_scenario
 from dikbench.plugins.built_scenarios import built
 from dikbench.study.plan import expand
-from dikbench.study.study import Selection, load_study, select
+from dikbench.study.selection import Selection, select
+from dikbench.study.study import load_study
 
 README = Path(__file__).parents[2] / "README.md"
 

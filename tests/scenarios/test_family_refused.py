@@ -9,7 +9,8 @@ import pytest
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_scenario
 from dikbench.study.plan import expand
-from dikbench.study.study import Selection, load_study, select
+from dikbench.study.selection import Selection, select
+from dikbench.study.study import load_study
 
 FAMILIES = '''
 from dataclasses import dataclass, replace

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import msgspec
+import numpy as np
 import pandas as pd
 
+from dikbench.arrays import Mask
 from dikbench.plugins.finding import plugins
 from dikbench.report.sentences.words import NOT_TIMED, listed, number, quoted, several
 from dikbench.scenario.oracle import ORACLE
@@ -21,6 +23,7 @@ from dikbench.statistics.trial_matrix import CONTENDER
 from dikbench.study.instances import is_instance_of
 from dikbench.study.plan import ways_of
 from dikbench.study.study import Study
+from dikbench.study.trial import NO_SOLVER
 
 FEW_SCENARIOS: Final = 2
 """More scenarios than this (and one) are counted, not listed."""
@@ -87,31 +90,37 @@ def _missing(trials: pd.DataFrame, manifest: Mapping[str, Any]) -> list[Limitati
 
 def in_plan(trials: pd.DataFrame, study: Mapping[str, Any]) -> pd.Series:
     """Which rows the study asks for; all of them where it does not say."""
-    inside = pd.Series(True, trials.index)
-    names = trials["formulation"].map(lambda text: parse_selector(text).name)
+    inside = np.zeros(len(trials), dtype=bool)
+    for cell in study.get("cells") or [{}]:
+        own = {axis: asked for axis in ("scenarios", "plants") if (asked := cell.get(axis))}
+        of_cell = np.ones(len(trials), dtype=bool)
+        if cell:
+            solvers = [*(cell.get("solvers") or DEFAULT_SOLVER.values()), NO_SOLVER.name]
+            of_cell = np.asarray(
+                trials["formulation"].isin(cell["formulations"]) & trials["solver"].isin(solvers)
+            )
+        inside[of_cell] |= _asked(trials[of_cell], {**study, **own})
+    return pd.Series(inside, trials.index)
+
+
+def _asked(rows: pd.DataFrame, study: Mapping[str, Any]) -> Mask:
+    """Say which rows of some formulations have the scenario and plant that a study asks for."""
+    inside = pd.Series(True, rows.index)
+    names = rows["formulation"].map(lambda text: parse_selector(text).name)
     for place, axis in enumerate(("plant", "reference")):
         if asked := study.get(f"{axis}s"):
             wanted = {name: ways_of(name)[place] or asked for name in names.unique()}
-            pairs = zip(names, trials[axis], strict=True)
-            inside &= pd.Series([value in wanted[name] for name, value in pairs], trials.index)
+            pairs = zip(names, rows[axis], strict=True)
+            inside &= pd.Series([value in wanted[name] for name, value in pairs], rows.index)
     if study.get("instances"):
         drawn = msgspec.convert(study, Study)
-        of_scenarios = zip(trials["scenario"], trials["seed"], strict=True)
-        inside &= pd.Series([is_instance_of(drawn, *cell) for cell in of_scenarios], trials.index)
+        of_scenarios = zip(rows["scenario"], rows["seed"], strict=True)
+        inside &= pd.Series([is_instance_of(drawn, *cell) for cell in of_scenarios], rows.index)
     else:
         for axis in ("scenario", "seed"):
             if asked := study.get(f"{axis}s"):
-                inside &= trials[axis].isin(asked)
-    if cells := study.get("cells"):
-        asked = {
-            (formulation, solver)
-            for cell in cells
-            for formulation in cell["formulations"]
-            for solver in (*(cell.get("solvers") or DEFAULT_SOLVER.values()), "none")
-        }
-        pairs = zip(trials["formulation"], trials["solver"], strict=True)
-        inside &= pd.Series([pair in asked for pair in pairs], trials.index)
-    return inside
+                inside &= rows[axis].isin(asked)
+    return inside.to_numpy()
 
 
 def _times(trials: pd.DataFrame) -> list[Limitation]:

@@ -20,7 +20,8 @@ from dikbench.results.folder import ResultsFolder
 from dikbench.run.in_workers import RunSettings, run_trials
 from dikbench.run.runner import run_study
 from dikbench.study.plan import expand
-from dikbench.study.study import Selection, load_study, select
+from dikbench.study.selection import Selection, select
+from dikbench.study.study import load_study
 
 UNEQUAL = ["wall_time_s", "control_time_s", "described"]
 """What may differ between two runs of the same trials."""

@@ -30,7 +30,8 @@ from dikbench.scenario.plant import Ideal
 from dikbench.selector import parse_selector
 from dikbench.simulation.closed_loop import simulate
 from dikbench.study.plan import PlannedTrial, expand
-from dikbench.study.study import Selection, Study, load_study, select
+from dikbench.study.selection import Selection, select
+from dikbench.study.study import Study, load_study
 
 NEAR_MISSES = (
     "near-miss[robot=panda,dt=0.05,miss=0.01|0.02|0.03,speed=0.3]",

@@ -24,8 +24,9 @@ from dikbench.selector import Selector, parse_selector
 from dikbench.study import instances
 from dikbench.study.instances import Attempt, accepted, draw, draw_instance, numbers_of
 from dikbench.study.plan import expand
+from dikbench.study.selection import Selection, select
 from dikbench.study.split import SPLITS, split_of
-from dikbench.study.study import Selection, Study, folder_of, load_study, select
+from dikbench.study.study import Study, folder_of, load_study
 
 DRAWN = sorted(set(plugins("scenario")) - {"csv"})
 

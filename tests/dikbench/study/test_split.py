@@ -9,8 +9,9 @@ import pytest
 
 from dikbench.errors import DikbenchError
 from dikbench.study.plan import expand
+from dikbench.study.selection import Selection, select
 from dikbench.study.split import SPLITS, split_of
-from dikbench.study.study import Selection, Study, load_study, select
+from dikbench.study.study import Study, load_study
 
 
 def test_the_splits_share_no_seed_and_neither_has_seed_zero() -> None:

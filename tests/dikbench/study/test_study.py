@@ -15,14 +15,13 @@ from dikbench.selector import parse_selector
 from dikbench.solvers.catalogue.back_ends import parse_solver
 from dikbench.study.explained import VALID
 from dikbench.study.plan import expand
+from dikbench.study.selection import Selection, select
 from dikbench.study.study import (
     Cells,
-    Selection,
     Study,
     TimingSettings,
     folder_of,
     load_study,
-    select,
     shipped_studies,
 )
 
