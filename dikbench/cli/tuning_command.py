@@ -23,7 +23,7 @@ from dikbench.cli.one_line_errors import one_line_errors
 )
 @click.option(
     "--budget",
-    type=click.IntRange(min=2),
+    type=click.IntRange(2, 4096),
     default=32,
     show_default=True,
     metavar="N",
@@ -71,7 +71,7 @@ def tune(
     both references and all families, then the smallest distance from the path. The same command
     continues a run that was stopped.
     """
-    from dikbench.plugins.building import in_declared_order
+    from dikbench.plugins.building import in_declared_order, make_formulation
     from dikbench.run.in_workers import RunSettings
     from dikbench.run.pool import available_cores
     from dikbench.run.runner import Interrupted
@@ -80,7 +80,9 @@ def tune(
     from dikbench.tuning.drawing import draw_sensitivity
     from dikbench.tuning.tables import gain_in_words, in_words, write_tables
 
-    chosen = [in_declared_order("formulation", text) for text in formulations] or tunable()
+    asked = [in_declared_order("formulation", text) for text in formulations] or tunable()
+    # Two names of the same formulation are one.
+    chosen = list({(each.name, repr(make_formulation(each))): each for each in asked}.values())
     command = shlex.join(["dikbench", *sys.argv[1:]])
     settings = RunSettings(jobs or available_cores(), traces="none")
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a stop like Ctrl-C
@@ -92,9 +94,6 @@ def tune(
             found.append(each)
             click.echo(in_words(each))
             write_tables(found, out)
-        if freeze:
-            for file in tuning.freeze(found):
-                click.echo(str(file))
         found = tuning.report_on_test(found, out, settings, command)
     except Interrupted as stopped:
         click.echo(f"\nstopped: {stopped}; to continue: {command}", err=True)
@@ -102,4 +101,6 @@ def tune(
     write_tables(found, out)
     for each in found:
         click.echo(gain_in_words(each))
+    for file in tuning.freeze(found) if freeze else ():
+        click.echo(str(file))
     click.echo(f"\n{out / 'tuning.csv'}\n{draw_sensitivity(found, out)}")

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -14,6 +15,7 @@ import msgspec
 
 from dikbench.errors import DikbenchError
 from dikbench.plugins.finding import formulation_plugin
+from dikbench.plugins.source import source_digest
 from dikbench.selector import TUNED, Selector
 
 FILE: Final = "tuned.toml"
@@ -28,7 +30,7 @@ class Tuned(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     Attributes:
         parameters: the values found; empty where nothing tried was better than the defaults.
         study, seed, budget: the study of the train split, the seed of the points, their number.
-        digest: hash of the trials of the study, with the sources of formulation and scenarios.
+        source: hash of the source of the formulation that was tuned.
         success, default_success: mean rate of success on that study, tuned and at the defaults.
     """
 
@@ -36,15 +38,16 @@ class Tuned(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     study: str
     seed: int
     budget: int
-    digest: str
+    source: str
     success: float
     default_success: float
 
 
 def key_of(selector: Selector) -> str:
-    """Return the name of a formulation in the file: its selector, a path's class only."""
+    """Return the name of a formulation in the file: its selector, a path without its folder."""
     plugin = formulation_plugin(selector.name)
-    name = selector.name.rpartition(":")[2]
+    file, colon, name = selector.name.rpartition(":")
+    name = f"{Path(file).name}{colon}{name}" if file else name
     return str(Selector(name, selector.parameters).ordered(plugin.parameters))
 
 
@@ -96,6 +99,12 @@ def with_tuned(selector: Selector) -> Selector:
         raise DikbenchError(
             f"formulation {selector.name}[{TUNED}]: {key!r} is not tuned in {file}; valid: "
             f"{valid}; `dikbench tune --freeze {plain}` adds it"
+        )
+    if known[key].source != source_digest(formulation_plugin(selector.name)):
+        warnings.warn(
+            f"{key} has another source than when it was tuned ({file}); `dikbench tune --freeze` "
+            "tunes it again",
+            stacklevel=2,
         )
     found = {name: f"{value:.{DIGITS}g}" for name, value in known[key].parameters.items()}
     return Selector(selector.name, {**given, **found})

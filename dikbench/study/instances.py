@@ -166,20 +166,19 @@ def draw_missing(
     Raises:
         DikbenchError: as `draw`.
     """
-    kept: dict[tuple[str, int], list[Attempt]] = {}
+    kept: dict[tuple[str, str, int], list[Attempt]] = {}
     for each in known:
-        kept.setdefault((each.source, each.number), []).append(each)
+        kept.setdefault((each.given, each.source, each.number), []).append(each)
     found: list[Attempt] = []
     for given in map(parse_selector, study.scenarios):
-        source, numbers = scenario_id_of(given), numbers_of(study)
-        missing = [number for number in numbers if (source, number) not in kept]
+        # What is fixed at its default is the same scenario as what is left to be drawn.
+        key, numbers = (str(given), scenario_id_of(given)), numbers_of(study)
+        missing = [number for number in numbers if (*key, number) not in kept]
         progress(len(numbers) - len(missing))
         if missing:
-            kept = {
-                key: a for key, a in kept.items() if a[0].given != str(given) or key[0] == source
-            }
+            kept = {of: a for of, a in kept.items() if of[0] != key[0] or of[1] == key[1]}
             for each in draw(given, missing, progress):
-                kept.setdefault((source, each.number), []).append(each)
+                kept.setdefault((*key, each.number), []).append(each)
             keep([each for attempts in kept.values() for each in attempts])
-        found += [each for number in numbers for each in kept[source, number]]
+        found += [each for number in numbers for each in kept[*key, number]]
     return found

@@ -74,6 +74,8 @@ def candidates(selector: Selector, budget: int, seed: int) -> list[Selector]:
             refused = f": {error}"
         if len(found) == budget:
             return list(found)
+    if found and not refused:  # whole numbers: all of them
+        return list(found)
     raise DikbenchError(
         f"formulation {str(selector)!r} accepts {len(found)} of {len(points)} points of its "
         f"ranges, fewer than the budget {budget}{refused}"
@@ -86,10 +88,11 @@ def _at(selector: Selector, ranges: Mapping[str, Drawn], point: Array) -> Select
     Raises:
         DikbenchError: if the formulation refuses it.
     """
-    values = {
-        name: f"{scaled(drawn, float(u)):.{DIGITS}g}"
-        for (name, drawn), u in zip(ranges.items(), point, strict=True)
-    }
+    parameters = formulation_plugin(selector.name).parameters
+    values = {}
+    for (name, drawn), u in zip(ranges.items(), point, strict=True):
+        value = scaled(drawn, float(u))
+        values[name] = str(round(value)) if parameters[name].whole else f"{value:.{DIGITS}g}"
     made = in_declared_order(
         "formulation", Selector(selector.name, {**selector.parameters, **values})
     )

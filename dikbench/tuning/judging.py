@@ -57,6 +57,8 @@ class Scores:
     def _first(self, number: int) -> int:
         """Return the place of the best of the first ones: by success, then by distance."""
         level = self.success[:number].max() - ROUNDING
+        if level <= 0:  # where nothing succeeds nothing is better than the default
+            return 0
         ties = np.flatnonzero(self.success[:number] >= level)
         return int(ties[np.argmin(self.log_distance[ties])])
 
@@ -71,7 +73,7 @@ def scores(trials: pd.DataFrame, default: Selector, candidates: Sequence[Selecto
     and scenarios (see `dikbench.statistics.success`).
 
     Args:
-        trials: rows of the train split, of one solver.
+        trials: rows of the train split, of one solver, and of an oracle.
         default: the formulation as it was given.
         candidates: what was tried.
 
@@ -79,9 +81,9 @@ def scores(trials: pd.DataFrame, default: Selector, candidates: Sequence[Selecto
         DikbenchError: if no scenario counts.
     """
     names = [str(default), *map(str, candidates)]
-    frame = mean_success(trials[trials["formulation"].isin(names)])
-    if frame.empty:
-        reasons = trials["status"] + ": " + trials["message"]
+    frame, own = mean_success(trials, names), trials[trials["formulation"].isin(names)]
+    if frame.empty or not own["status"].eq("ok").any():
+        reasons = own["status"] + ": " + own["message"]
         raise DikbenchError(
             f"{default}: no trial counts: {reasons.mode().iloc[0]}; valid: a formulation that "
             "runs, on scenarios that a known motion can do"
@@ -122,7 +124,7 @@ def gain(trials: pd.DataFrame, scored: Scores) -> Gain:
         scored: how it did on the train split.
     """
     names = [str(each) for each in (scored.default, scored.best, scored.worst)]
-    frame = mean_success(trials[trials["formulation"].isin(names)])
+    frame = mean_success(trials, names)
     first = frame[frame["formulation"].eq(names[0])].iloc[0]
     found = rates(frame, frame["success"].to_numpy(), [(names[0], str(first["solver"]))])
     at = pd.Index(found.contenders["formulation"]).get_indexer(pd.Index(names))

@@ -9,17 +9,21 @@ from pathlib import Path
 from typing import Final
 
 import msgspec
+import pandas as pd
 import tomli_w
 
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_formulation
-from dikbench.plugins.source import digest
+from dikbench.plugins.finding import formulation_plugin
+from dikbench.plugins.source import source_digest
 from dikbench.plugins.tuned import Tuned, file_for, key_of, read_tuned
 from dikbench.problem.problem import program_of
+from dikbench.results.folder import ResultsFolder
 from dikbench.results.instances import read_attempts, write_attempts
-from dikbench.results.reading import read_results, without_attributes
+from dikbench.results.selected import with_selected
 from dikbench.run.in_workers import RunSettings
 from dikbench.run.runner import run_study
+from dikbench.scenario.oracle import ORACLE
 from dikbench.selector import Selector
 from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER
 from dikbench.study.study import Cells, Study, load_study
@@ -61,6 +65,10 @@ def train_study(name: str) -> Study:
             f"study {study.name}: split = {study.split!r}; valid for tuning: a study with "
             f"split = {TRAIN!r}, so that what is reported was not used to choose"
         )
+    if len(study.plants) > 1:
+        raise DikbenchError(
+            f"study {study.name}: plants = {list(study.plants)}; valid for tuning: one plant"
+        )
     return msgspec.structs.replace(study, timing=None, example="")
 
 
@@ -97,15 +105,14 @@ def tune(
         print(f"{default} ({number} of {len(formulations)})", file=sys.stderr)
         folder = run_study(asked, out / name, settings, command)
         _hand_over_instances(folder.path, out)
-        trials = without_attributes(read_results(folder.path)).trials
-        scored = scores(trials, default, chosen)
+        scored = scores(_planned(folder), default, chosen)
         found = scored.best.parameters
         entry = Tuned(
             parameters={key: float(found[key]) for key in ranges_of(default) if key in found},
             study=study.name,
             seed=seed,
             budget=budget,
-            digest=digest("\n".join(sorted(trials["id"][trials["formulation"].eq(str(default))]))),
+            source=source_digest(formulation_plugin(default.name)),
             success=round(scored.best_success, 4),
             default_success=round(float(scored.success[0]), 4),
         )
@@ -137,16 +144,26 @@ def report_on_test(
     ]
     asked = msgspec.structs.replace(study, cells=tuple(cells))
     folder = run_study(asked, out / TEST, settings, command)
-    trials = without_attributes(read_results(folder.path)).trials
+    trials = _planned(folder)
     return [replace(each, gain=gain(trials, each.scores)) for each in tunings]
 
 
 def with_cells(study: Study, formulations: Sequence[Selector]) -> Study:
-    """Return the study with these formulations only, each once, with their default solver."""
+    """Return the study with these formulations only, each once, with their default solver.
+
+    The oracle runs beside them, so that the facts of scenarios are known that they refuse.
+    """
     program = program_of(make_formulation(formulations[0]))
     solvers = () if program is None else (DEFAULT_SOLVER[program],)
     names = tuple(dict.fromkeys(map(str, formulations)))
-    return msgspec.structs.replace(study, cells=(Cells(names, solvers),))
+    return msgspec.structs.replace(study, cells=(Cells(names, solvers), Cells((ORACLE,))))
+
+
+def _planned(folder: ResultsFolder) -> pd.DataFrame:
+    """Read the rows that the last run in a folder asked for, without those of earlier ones."""
+    with folder.open_store() as store:
+        # Those of the last plan come first.
+        return with_selected(store.trials().head(len(store.planned())))
 
 
 def freeze(tunings: Sequence[Tuning]) -> list[Path]:
@@ -174,6 +191,8 @@ def write_tuned(file: Path, entries: Mapping[str, Tuned]) -> None:
     """
     ordered = {name: msgspec.structs.asdict(entries[name]) for name in sorted(entries)}
     try:
-        file.write_text(HEAD + tomli_w.dumps(ordered), encoding="utf-8")
+        partial = file.with_name(file.name + ".partial")
+        partial.write_text(HEAD + tomli_w.dumps(ordered), encoding="utf-8")
+        partial.replace(file)
     except OSError as error:
         raise DikbenchError(f"file {file}: {error.strerror or error}") from None

@@ -22,7 +22,14 @@ from dikbench.results.instances import INSTANCES, read_attempts
 from dikbench.run.folder_of_instances import instances_in
 from dikbench.selector import Selector, parse_selector
 from dikbench.study import instances
-from dikbench.study.instances import Attempt, accepted, draw, draw_instance, numbers_of
+from dikbench.study.instances import (
+    Attempt,
+    accepted,
+    draw,
+    draw_instance,
+    draw_missing,
+    numbers_of,
+)
 from dikbench.study.plan import expand
 from dikbench.study.selection import Selection, select
 from dikbench.study.split import SPLITS, split_of
@@ -305,3 +312,15 @@ def test_most_of_what_is_drawn_is_accepted(name: str) -> None:
     attempts: list[Attempt] = draw(parse_selector(name), range(100, 130))
     first = [each for each in attempts if each.seed < SEEDS_APART]
     assert sum(not each.rejected for each in first) >= len(first) / 2
+
+
+def test_what_is_fixed_at_its_default_is_fixed() -> None:
+    """Beside the same family with nothing fixed, in either order."""
+    for order in (("near-miss", "near-miss[robot=ur5]"), ("near-miss[robot=ur5]", "near-miss")):
+        attempts = draw_missing(_study(scenarios=order, instances=3))
+        robots: dict[str, set[str]] = {}
+        for attempt in attempts:
+            drawn = parse_selector(attempt.scenario)
+            robots.setdefault(attempt.given, set()).add(drawn.parameters["robot"])
+        assert robots["near-miss[robot=ur5]"] == {"ur5"}
+        assert len(robots["near-miss"]) == 3

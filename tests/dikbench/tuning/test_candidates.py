@@ -89,6 +89,16 @@ def test_refused_points_are_passed_over(tmp_path: Path) -> None:
         candidates(Selector(f"{file}:Picky", {"most": "0.01"}), 8, 0)
 
 
+def test_a_whole_number_is_tried_whole(tmp_path: Path) -> None:
+    """Where it has fewer values than the budget has points, each once."""
+    file = tmp_path / "whole.py"
+    real = "a: Annotated[float, Range(0.0, 1.0), Drawn(0.0, 1.0)] = 0.1"
+    text = PICKY.replace(real, "a: Annotated[int, Range(0, 9), Drawn(1, 4)] = 1")
+    file.write_text(text.replace("most: float = 0.5", "most: float = 9.0"))
+    made = candidates(Selector(f"{file}:Picky"), 16, 0)
+    assert sorted(each.parameters["a"] for each in made) == ["1", "2", "3", "4"]
+
+
 def test_nothing_to_tune_is_said() -> None:
     """The error says which formulations have something."""
     with pytest.raises(DikbenchError, match=r"'pinv' has no parameter to tune; valid: .*dls"):

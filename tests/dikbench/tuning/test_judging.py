@@ -34,7 +34,9 @@ def rows(
 
 def test_success_is_the_mean_over_the_tolerances() -> None:
     """4 mm off the path: outside at 1 and 2 mm, inside at 5, 10 and 20."""
-    found = mean_success(rows({"dls": off_path(0.004, 0.0)})).set_index("scenario")["success"]
+    found = mean_success(rows({"dls": off_path(0.004, 0.0)}), ["dls"]).set_index("scenario")[
+        "success"
+    ]
     assert found["reach"] == pytest.approx(3 / 5)
     assert found["reach[distance=0.2]"] == 1.0
 
@@ -43,7 +45,7 @@ def test_both_references_count_alike() -> None:
     """What only keeps up where the path may wait succeeds in half."""
     late = make_rows({"dls": off_path(0.5)}, ("reach",), reference="time")
     waiting = make_rows({"dls": off_path(0.0)}, ("reach",), reference="path")
-    found = mean_success(pd.concat([late, waiting], ignore_index=True))
+    found = mean_success(pd.concat([late, waiting], ignore_index=True), ["dls"])
     assert list(found["success"]) == [0.5]
 
 
@@ -55,7 +57,7 @@ def test_a_trial_that_failed_succeeds_nowhere() -> None:
         "outcome": "diverged",
     }
     failed |= {"contour_error_6d_max_m": float("nan")}
-    found = mean_success(rows({"dls": failed}, ("reach",)))
+    found = mean_success(rows({"dls": failed}, ("reach",)), ["dls"])
     assert list(found["success"]) == [0.0]
     assert list(found["log_distance"]) == [0.0]
 
@@ -129,3 +131,35 @@ def test_the_gain_is_the_paired_difference_on_other_rows() -> None:
     assert found.difference == pytest.approx(0.2)
     assert found.lower <= 0.2 <= found.upper
     assert found.cases == 2
+
+
+def test_nobody_gains_by_refusing() -> None:
+    """What is skipped succeeds nowhere, also where all refuse it: by the oracle's facts."""
+    law = "dls[damping=0.01]"
+    skipped = {"status": ["ok", "skipped"], "feasible": ["time", ""], "outcome": ["success", ""]}
+    table = rows({"dls": off_path(0.004, 0.004), law: skipped})
+    means = mean_success(table, ["dls", law]).groupby("formulation")["success"].mean()
+    assert dict(means) == pytest.approx({"dls": 0.6, law: 0.5})
+    alone = table[table["formulation"].eq(law)]
+    assert len(mean_success(alone, [law])) == 1
+    oracle = make_rows({"oracle": {}}, ("reach", "reach[distance=0.2]"))
+    known = mean_success(pd.concat([alone, oracle], ignore_index=True), [law])
+    assert list(known["success"]) == [1.0, 0.0]
+
+
+def test_who_crashes_first_is_not_near_the_path() -> None:
+    """A tie in success is not won by a run that ended before it could leave the path."""
+    crashes = {"status": ["law-error", "ok"], "contour_error_6d_max_m": [0.0, 0.0]}
+    far = {str(each): off_path(0.05, 0.0) for each in CANDIDATES}
+    table = rows({"dls": off_path(0.06, 0.0), **far, str(CANDIDATES[0]): crashes})
+    found = scores(table, LAW, CANDIDATES)
+    assert list(found.success) == pytest.approx([0.5] * 5)
+    assert found.best == CANDIDATES[1]
+    assert found.worst == CANDIDATES[0]
+
+
+def test_where_nothing_succeeds_the_default_stays() -> None:
+    """However near to the path another one comes."""
+    far = {str(each): off_path(0.5, 0.5) for each in CANDIDATES}
+    found = scores(rows({"dls": off_path(0.9, 0.9), **far}), LAW, CANDIDATES)
+    assert found.best == LAW

@@ -69,9 +69,9 @@ def test_the_best_share_is_the_largest(tuned: tuple[Path, list[tuning.Tuning]]) 
     _, (found,) = tuned
     shares = [float(each.parameters["share"]) for each in found.scores.candidates]
     assert found.entry.parameters == {"share": max(shares)}
-    assert found.name == "Lazy"
+    assert found.name == "lazy.py:Lazy"
     assert found.entry.success >= found.entry.default_success
-    assert len(found.entry.digest) == 16
+    assert len(found.entry.source) == 16
 
 
 def test_what_is_frozen_is_selected(tuned: tuple[Path, list[tuning.Tuning]]) -> None:
@@ -81,7 +81,7 @@ def test_what_is_frozen_is_selected(tuned: tuple[Path, list[tuning.Tuning]]) -> 
     other = msgspec.structs.replace(found[0].entry, parameters={"share": 0.25})
     tuning.write_tuned(beside, {"Other": other})
     assert tuning.freeze(found) == [beside]
-    assert read_tuned(beside) == {"Other": other, "Lazy": found[0].entry}
+    assert read_tuned(beside) == {"Other": other, "lazy.py:Lazy": found[0].entry}
     share = found[0].entry.parameters["share"]
     law = f"{file}:Lazy[tuned]"
     assert f"share={share}" in repr(make_formulation(law))
@@ -95,6 +95,30 @@ def test_a_formulation_that_fails_everywhere_is_named(tmp_path: Path) -> None:
     law, settings = parse_selector(f"{file}:Lazy"), RunSettings(1, traces="none")
     with without_workers(), pytest.raises(DikbenchError, match=r"no trial counts: .*'nothing'"):
         list(tuning.tune([law], STUDY, 2, 0, tmp_path / "out", settings, "tune"))
+
+
+def test_rows_of_an_earlier_plan_do_not_count(tmp_path: Path) -> None:
+    """A study that has lost a scenario, in the folder of its runs, is judged as in a new one."""
+    file = tmp_path / "lazy.py"
+    file.write_text(LAZY)
+    law, settings = parse_selector(f"{file}:Lazy"), RunSettings(1, traces="none")
+    two = msgspec.structs.replace(STUDY, scenarios=(*STUDY.scenarios, "reach"))
+    found = []
+    with without_workers():
+        for study, out in ((two, "a"), (STUDY, "a"), (STUDY, "b")):
+            (each,) = tuning.tune([law], study, 2, 0, tmp_path / out, settings, "tune")
+            found.append(each)
+    assert [each.scores.cases for each in found] == [2, 1, 1]
+    assert list(found[1].scores.success) == list(found[2].scores.success)
+
+
+def test_parameters_of_another_source_are_said(tuned: tuple[Path, list[tuning.Tuning]]) -> None:
+    """What was tuned before an edit is still selected, with a warning."""
+    file, found = tuned
+    other = msgspec.structs.replace(found[0].entry, source="0" * 16)
+    tuning.write_tuned(file.with_name(FILE), {"lazy.py:Lazy": other})
+    with pytest.warns(UserWarning, match=r"lazy.py:Lazy has another source than when it was tuned"):
+        make_formulation(f"{file}:Lazy[tuned]")
 
 
 def test_tables_and_picture_say_it(tuned: tuple[Path, list[tuning.Tuning]], tmp_path: Path) -> None:
@@ -134,7 +158,7 @@ def test_what_is_not_tuned_is_said(tmp_path: Path) -> None:
     """The error names the file, what it holds, and the command that adds it."""
     file = tmp_path / "lazy.py"
     file.write_text(LAZY)
-    with pytest.raises(DikbenchError, match=r"'Lazy' is not tuned in .*tuned.toml; valid: none"):
+    with pytest.raises(DikbenchError, match=r"'lazy.py:Lazy' is not tuned in .*; valid: none"):
         make_formulation(f"{file}:Lazy[tuned]")
     file.with_name(FILE).write_text("[Lazy]\nparameters = 3\n")
     with pytest.raises(DikbenchError, match=r"tuned.toml: not tuned parameters: "):
