@@ -164,7 +164,12 @@ def kind_in_file(name: str) -> Kind:
 def _plugin(kind: Kind, name: str) -> Plugin:
     if in_file(name):
         path, class_name = _file_and_class(name)
-        return _registered(kind, class_name, _class_from_file(path, class_name), path)
+        found = _class_from_file(path, class_name)
+        plugin = _registered(kind, class_name, found, path)
+        if found.__module__ != _module_from_file(path).__name__:  # it is imported there
+            return plugin
+        # Another file of this name, in another folder, may have taken the module's place.
+        return replace(plugin, file=os.path.abspath(path))
     known = plugins(kind)
     if name not in known:
         where = "(or give path/to/file.py:Class)"

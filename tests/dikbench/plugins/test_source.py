@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from dikbench.plugins.finding import Plugin
+from dikbench.plugins.finding import Plugin, formulation_plugin
 from dikbench.plugins.source import digest_of_file, source_digest
 
 CHECKOUT = Path(__file__).parents[3]
@@ -168,3 +168,26 @@ def test_a_class_of_a_prompt_has_a_digest() -> None:
 
     digest = source_digest(Plugin("law", Law, "<stdin>"))
     assert len(digest) == 16
+
+
+def test_files_of_one_name_in_two_folders_keep_their_sources(tmp_path: Path) -> None:
+    """Whichever was loaded last: each plug-in has its own file, and its own digest."""
+    text = (
+        "from dataclasses import dataclass\n"
+        "from dikbench.parameters import Parameters\n"
+        "@dataclass(frozen=True)\n"
+        "class Law(Parameters):\n"
+        "    def velocity(self, problem, solve):\n"
+        "        return {factor} * problem.q\n"
+    )
+    digests: dict[str, set[str]] = {}
+    for _ in range(2):
+        for folder, factor in (("a", 1), ("b", 2)):
+            file = tmp_path / folder / "law.py"
+            file.parent.mkdir(exist_ok=True)
+            file.write_text(text.format(factor=factor))
+            plugin = formulation_plugin(f"{file}:Law")
+            assert plugin.file == str(file)
+            digests.setdefault(folder, set()).add(source_digest(plugin))
+    assert all(len(found) == 1 for found in digests.values())
+    assert digests["a"] != digests["b"]
