@@ -192,11 +192,6 @@ class Parameter:
         return any(part in (int, float) for part in kinds) and str not in kinds
 
     @property
-    def whole(self) -> bool:
-        """Whether it is a whole number, or none."""
-        return self.numeric and float not in (self.type, *typing.get_args(self.type))
-
-    @property
     def hidden(self) -> bool:
         """Whether it has one value only, so that lists leave it out."""
         return len(self.choices) == 1

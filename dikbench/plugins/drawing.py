@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import exp, isnan, log
-from typing import Final
+from typing import Final, get_args
 
 import numpy as np
 
 from dikbench.errors import DikbenchError
-from dikbench.parameters import Parameter
+from dikbench.parameters import Drawn, Parameter
 from dikbench.plugins.finding import Plugin, scenario_plugin
 from dikbench.plugins.source import digest
 from dikbench.scenario.family import certified_robots
@@ -76,6 +76,19 @@ def drawn_robots(plugin: Plugin, given: Selector) -> tuple[str, ...]:
     return () if "robot" in given.parameters else certified_robots(plugin.factory)
 
 
+def is_whole(parameter: Parameter) -> bool:
+    """Say whether a parameter is a whole number, or none."""
+    return parameter.numeric and float not in (parameter.type, *get_args(parameter.type))
+
+
+def scaled(drawn: Drawn, share: float) -> float:
+    """Return the number at a share of a range, 0 to 1, of its logarithms where `log` is set."""
+    low, high = drawn.low, drawn.high
+    if drawn.log:
+        return exp(log(low) + share * (log(high) - log(low)))
+    return low + share * (high - low)
+
+
 def _drawn(parameter: Parameter, random: np.random.Generator) -> str:
     """Draw the value of a parameter, as a text that is exact.
 
@@ -91,12 +104,8 @@ def _drawn(parameter: Parameter, random: np.random.Generator) -> str:
         raise DikbenchError(
             f"{parameter.name}: Drawn() of {parameter.valid} has no bounds; valid: Drawn(low, high)"
         )
-    if parameter.type is int and not bounds.log:
+    if is_whole(parameter) and not bounds.log:
         return str(int(random.integers(int(low), int(high), endpoint=True)))
-    share = random.uniform()
-    if bounds.log:
-        value = exp(log(low) + share * (log(high) - log(low)))
-    else:
-        value = low + share * (high - low)
-    rounded = round(value) if parameter.type is int else float(f"{value:.{DIGITS}g}")
+    value = scaled(bounds, random.uniform())
+    rounded = round(value) if is_whole(parameter) else float(f"{value:.{DIGITS}g}")
     return repr(min(max(rounded, low), high))

@@ -14,14 +14,12 @@ from typing import Final
 import msgspec
 
 from dikbench.errors import DikbenchError
+from dikbench.plugins.drawing import DIGITS
 from dikbench.plugins.finding import formulation_plugin
 from dikbench.plugins.source import source_digest
 from dikbench.selector import TUNED, Selector
 
 FILE: Final = "tuned.toml"
-
-DIGITS: Final = 4
-"""Significant digits of a tuned or drawn number, so that its text is exact."""
 
 
 class Tuned(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -13,8 +13,8 @@ from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.parameters import Drawn
 from dikbench.plugins.building import in_declared_order, make_formulation
+from dikbench.plugins.drawing import DIGITS, is_whole, scaled
 from dikbench.plugins.finding import formulation_plugin, plugins
-from dikbench.plugins.tuned import DIGITS
 from dikbench.selector import Selector
 
 MOST_POINTS_PER_CANDIDATE: Final = 4
@@ -92,19 +92,12 @@ def _at(selector: Selector, ranges: Mapping[str, Drawn], point: Array) -> Select
     values = {}
     for (name, drawn), u in zip(ranges.items(), point, strict=True):
         value = scaled(drawn, float(u))
-        values[name] = str(round(value)) if parameters[name].whole else f"{value:.{DIGITS}g}"
+        values[name] = str(round(value)) if is_whole(parameters[name]) else f"{value:.{DIGITS}g}"
     made = in_declared_order(
         "formulation", Selector(selector.name, {**selector.parameters, **values})
     )
     make_formulation(made)
     return made
-
-
-def scaled(drawn: Drawn, u: float) -> float:
-    """Return the number at a share u of a range, of its logarithms where `log` is set."""
-    if drawn.log:
-        return float(np.exp(log(drawn.low) + u * log(drawn.high / drawn.low)))
-    return drawn.low + u * (drawn.high - drawn.low)
 
 
 def share(drawn: Drawn, value: float) -> float:

@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from dikbench.errors import DikbenchError
 from dikbench.parameters import Drawn
 from dikbench.plugins.building import make_formulation
+from dikbench.plugins.drawing import scaled
 from dikbench.selector import Selector, parse_selector
-from dikbench.tuning.candidates import at_edge, candidates, ranges_of, scaled, share, tunable
+from dikbench.tuning.candidates import at_edge, candidates, ranges_of, share, tunable
 
 PICKY = """
 from dataclasses import dataclass
