@@ -68,8 +68,8 @@ def tune(
     FORMULATION is a selector; its parameters in brackets stay as they are. Default: all that have
     a parameter to tune. For each, points of a scrambled Sobol sequence are tried over the ranges
     that its class declares, and the best has the largest mean success over 1, 2, 5, 10 and 20 mm,
-    both references and the families of the study, then the smallest distance from the path. The same command
-    continues a run that was stopped.
+    both references and the families of the study, then the smallest distance from the path. The
+    same command continues a run that was stopped.
     """
     from dikbench.plugins.building import in_declared_order, make_formulation
     from dikbench.run.in_workers import RunSettings
