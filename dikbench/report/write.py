@@ -7,6 +7,7 @@ from pathlib import Path
 from dikbench.errors import DikbenchError
 from dikbench.report.contents.contents import Contents, gather
 from dikbench.report.figures.every import draw_figures
+from dikbench.report.interactive.embedded import embed
 from dikbench.report.pages.html_page import render_html
 from dikbench.report.pages.markdown_page import render_markdown
 from dikbench.report.tables.build import make_table
@@ -37,7 +38,7 @@ def write_report(path: Path) -> str:
         contents = gather(results, draw_figures(results.folder, results.trials, results.manifest))
         codes = _write_tables(path, contents)
         write_instances(read_attempts(path), path / "tables")
-        page = render_html(contents, path / "figures")
+        page = render_html(contents, path / "figures", embed(results.trials))
         (path / "report.html").write_text(page, encoding="utf-8")
         (path / "report.md").write_text(render_markdown(contents), encoding="utf-8")
     except OSError as error:

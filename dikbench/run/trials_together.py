@@ -75,7 +75,7 @@ def work_together(
         if not isinstance(found, Prepared):
             rows[number] = found
             continue
-        kind = _kind(found)
+        kind = kind_of_trial(found)
         if kind is None:
             alone.append((number, found))
         else:
@@ -83,7 +83,7 @@ def work_together(
     together: list[tuple[int, Prepared, LockstepRun]] = []
     for group in groups.values():
         try:
-            found_runs = _in_lockstep([ready for _, ready in group])
+            found_runs = in_lockstep([ready for _, ready in group])
         except BaseException as error:
             if len(trials) > 1:  # who it was is found out in smaller blocks
                 raise BlockEnded(f"{type(error).__name__}: {error}") from None
@@ -120,7 +120,7 @@ def _raise(error: BaseException) -> TrialRow:
     raise error
 
 
-def _kind(ready: Prepared) -> object | None:
+def kind_of_trial(ready: Prepared) -> object | None:
     """Return what trials must share to run in lockstep; None where one runs alone."""
     trial = ready.trial
     if trial.formulation.name in ORACLES or not is_batched(ready.formulation):
@@ -132,8 +132,8 @@ def _kind(ready: Prepared) -> object | None:
     return kind, trial.plant, trial.reference
 
 
-def _in_lockstep(ready: Sequence[Prepared]) -> list[LockstepRun]:
-    """Run trials of one kind."""
+def in_lockstep(ready: Sequence[Prepared]) -> list[LockstepRun]:
+    """Run trials of one kind (see `kind_of_trial`)."""
     first = ready[0]
     trials: list[LockstepTrial] = []
     known: dict[tuple[Selector, Selector], Formulation] = {}

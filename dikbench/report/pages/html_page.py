@@ -17,9 +17,11 @@ from markupsafe import Markup
 
 from dikbench.report.contents.contents import Contents
 from dikbench.report.drawing.figure import Figure
+from dikbench.report.interactive.embedded import Embedded
 from dikbench.report.pages.backticks import to_html
 from dikbench.report.tables.table import Column, TableCell, shown
 
+PLAYED: Final = ("play", "Matrix")
 SECTIONS: Final = (
     ("summary", "Summary"),
     ("tables", "Tables"),
@@ -32,7 +34,7 @@ SECTIONS: Final = (
     ("made", "How it was made"),
 )
 
-MOST: Final = 9_500_000
+MOST: Final = 11_000_000
 """Bytes of a page; figures that find no room in it stay files beside it."""
 
 _VIEW: Final = re.compile(rb'viewBox="0 0 ([\d.]+) ([\d.]+)"')
@@ -60,31 +62,23 @@ class Inlined:
 
 @dataclass(frozen=True)
 class Assets:
-    """Style and scripts of the page, with the hashes by which a browser lets them through."""
+    """Style and script of the page."""
 
     style: Markup
     script: Markup
 
-    @property
-    def style_hash(self) -> str:
-        """Of the style, for the policy of the page."""
-        return _hash(self.style)
 
-    @property
-    def script_hash(self) -> str:
-        """Of the scripts."""
-        return _hash(self.script)
-
-
-def render_html(contents: Contents, figures: Path) -> str:
+def render_html(contents: Contents, figures: Path, embedded: Embedded | None) -> str:
     """The page.
 
-    Nothing but the scripts and the style that come with dikbench is run: the page's own policy
-    forbids every other one, and every connection.
+    Nothing is run but the scripts that come with dikbench: the page's own policy forbids every
+    other one, and every connection. They bear a word that nobody knows who wrote what the page
+    says, for it is a hash of the page.
 
     Args:
         contents: what it says.
         figures: the folder of the figures.
+        embedded: what is played on it; None where there is nothing.
     """
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("dikbench.report.pages"),
@@ -100,10 +94,18 @@ def render_html(contents: Contents, figures: Path) -> str:
         "capitalize_first": lambda text: text[:1].upper() + text[1:],
     }
     template = environment.get_template("page.html.j2")
-    given = {"contents": contents, "sections": SECTIONS, "assets": _assets()}
-    bare = template.render(figures=[], **given)
+    given = {
+        "contents": contents,
+        "sections": SECTIONS if embedded is None else (PLAYED, *SECTIONS),
+        "assets": _assets(),
+        "charts": None if embedded is None else embedded.charts,
+        "page_data": Markup("" if embedded is None else embedded.data),
+        "bundle": Markup("" if embedded is None else embedded.bundle),
+    }
+    bare = template.render(figures=[], nonce="", **given)
     room = (MOST - len(bare.encode())) * 3 // 4  # of four characters a figure has three bytes
-    return template.render(figures=_inlined(contents.figures, figures, room), **given)
+    nonce = hashlib.sha256(bare.encode()).hexdigest()
+    return template.render(figures=_inlined(contents.figures, figures, room), nonce=nonce, **given)
 
 
 def _td(cell: TableCell, column: Column) -> Markup:
@@ -130,13 +132,7 @@ def _td(cell: TableCell, column: Column) -> Markup:
 def _assets() -> Assets:
     folder = resources.files("dikbench.report.pages") / "assets"
     style = (folder / "report.css").read_text(encoding="utf-8")
-    scripts = [(folder / name).read_text(encoding="utf-8") for name in ("sortable.js", "report.js")]
-    return Assets(Markup(style), Markup("\n".join(scripts)))
-
-
-def _hash(text: str) -> str:
-    digest = hashlib.sha256(text.encode()).digest()
-    return f"sha256-{base64.b64encode(digest).decode()}"
+    return Assets(Markup(style), Markup((folder / "page.js").read_text(encoding="utf-8")))
 
 
 def _inlined(figures: Sequence[Figure], folder: Path, room: int) -> list[Inlined]:

@@ -1,0 +1,253 @@
+"""The charts of the page, declared over its rows: nothing is computed but what stands here."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any, Final
+
+import altair as alt
+
+from dikbench.report.interactive.controls import Control, filter_of
+from dikbench.report.interactive.page_rows import TOLERANCES_M
+from dikbench.report.selection.categories import CATEGORIES
+from dikbench.statistics.first_places import FEWEST_SCENARIOS
+from dikbench.statistics.success import MOST_BEHIND
+
+ROWS: Final = "rows"
+"""The data set that the page fills."""
+
+DEVIATIONS: Final = 1.96
+"""Of a 95 % interval, in standard deviations."""
+
+GOOD: Final = "#0B7A75"
+OTHER: Final = "#8a8f98"
+CHOSEN: Final = "#B4468F"
+BAD: Final = "#C8502B"
+
+ROW_PX: Final = 20
+OVERALL_PX: Final = 180
+SITUATION_PX: Final = 144
+BAR_SHARE: Final = 0.74
+"""Of a situation's width; its number takes the rest."""
+
+_AT: Final = (
+    "toNumber(slice(datum.outcomes,{place}+(limits=='kept'?0:{half}),"
+    "1+{place}+(limits=='kept'?0:{half})))"
+)
+_HALF: Final = 1 + len(TOLERANCES_M)
+
+
+def counted_rows(controls: Sequence[Control], place: str = "toNumber(tolerance)") -> alt.Chart:
+    """Take the rows that the controls leave, with their category and whether they succeed."""
+    category = _AT.format(place=place, half=_HALF)
+    return (
+        alt.Chart(alt.Data(name=ROWS))
+        .transform_filter(filter_of(controls))
+        .transform_calculate(category=category)
+        .transform_calculate(done="datum.category==0?1:0")
+    )
+
+
+def weighted(rows: alt.Chart, *within: str) -> alt.Chart:
+    """Weigh the rows of each law: families alike, then robots, scenarios and what is below.
+
+    It adds `w`, which sums to 1 for each law (and each value of `within`), as
+    `statistics.success.hierarchical_weights` does.
+    """
+    law = ["law", *within]
+    return (
+        rows.transform_joinaggregate(families="distinct(family)", groupby=law)
+        .transform_joinaggregate(robots="distinct(robot)", groupby=[*law, "family"])
+        .transform_joinaggregate(scenarios="distinct(scenario)", groupby=[*law, "family", "robot"])
+        .transform_joinaggregate(cases="count()", groupby=[*law, "family", "robot", "scenario"])
+        .transform_calculate(
+            w="1/(datum.families*datum.robots*datum.scenarios*datum.cases)",
+            done_w="datum.done/(datum.families*datum.robots*datum.scenarios*datum.cases)",
+        )
+        .transform_joinaggregate(rate="sum(done_w)", trials="count()", groupby=law)
+    )
+
+
+def ranked(controls: Sequence[Control]) -> alt.Chart:
+    """Rank the laws by success, each compared with the best or with the law of `versus`.
+
+    A row per law: rate, trials, whole (whether it ran every case), difference, lower, upper (the
+    paired interval: of independent scenarios), tied, place. Who did not run every case is not
+    ranked, nor anybody where fewer than `FEWEST_SCENARIOS` scenarios count.
+    """
+    return (
+        weighted(counted_rows(controls))
+        .transform_joinaggregate(most="max(trials)")
+        .transform_calculate(whole="datum.trials==datum.most?1:0")
+        .transform_aggregate(
+            s="mean(done)", w="sum(w)", rate="max(rate)", trials="max(trials)", whole="max(whole)",
+            groupby=["law", "family", "robot", "scenario"],
+        )
+        .transform_joinaggregate(count="distinct(scenario)")
+        .transform_calculate(against="versus=='best'?datum.whole*10+datum.rate:datum.law==versus?1:0")
+        .transform_window(
+            base="first_value(s)", rival="first_value(law)",
+            sort=[alt.SortField("against", "descending"), alt.SortField("law")],
+            groupby=["scenario"], frame=[None, None],
+        )
+        .transform_calculate(d="datum.s-datum.base", wd="datum.w*(datum.s-datum.base)")
+        .transform_joinaggregate(difference="sum(wd)", groupby=["law"])
+        .transform_calculate(v="pow(datum.w*(datum.d-datum.difference),2)")
+        .transform_aggregate(
+            rate="max(rate)", trials="max(trials)", whole="max(whole)", count="max(count)",
+            difference="max(difference)", variance="sum(v)", rival="max(rival)", groupby=["law"],
+        )
+        .transform_calculate(half=f"{DEVIATIONS}*sqrt(datum.variance)")
+        .transform_calculate(
+            lower="max(-1,datum.difference-datum.half)",
+            upper="min(1,datum.difference+datum.half)",
+            low="max(0,datum.rate-datum.half)",
+            high="min(1,datum.rate+datum.half)",
+            enough=f"datum.count>={FEWEST_SCENARIOS}?1:0",
+            rounded="datum.whole*1e7+round(1e6*datum.rate)",
+        )
+        .transform_window(
+            best="max(rate)", sort=[alt.SortField("whole", "descending")], frame=[None, None],
+            groupby=["whole"],
+        )
+        .transform_calculate(
+            tied="datum.whole==1&&datum.enough==1&&datum.rate>0"
+            f"&&datum.rate>=datum.best-{MOST_BEHIND}"
+            "&&(versus!='best'?datum.rate==datum.best:datum.difference+datum.half>=0)?1:0"
+        )
+        .transform_window(
+            place="rank()", dense="dense_rank()", sort=[alt.SortField("rounded", "descending")]
+        )
+        .transform_filter("datum.dense<=toNumber(most)||datum.law==versus")
+    )  # fmt: skip
+
+
+def matrix(controls: Sequence[Control], situations: Sequence[str]) -> Any:
+    """Draw laws over situations: a bar of outcomes each, sorted by success."""
+    by_success = alt.EncodingSortField(field="sorted", op="max", order="descending")
+    lines = alt.Axis(ticks=False, domain=False, labelFontSize=12, labelLimit=230, minExtent=175,
+                     labelPadding=6, title=None)  # fmt: skip
+    scale = alt.Scale(domain=[0, 1.42], nice=False)
+    rates = ranked(controls).transform_calculate(sorted="datum.rounded", zero="0")
+    y = alt.Y("law:N", axis=lines, sort=by_success)
+    colour = alt.condition("datum.tied==1", alt.value(GOOD), alt.value(OTHER))
+    tooltip = [
+        alt.Tooltip("law:N"),
+        alt.Tooltip("rate:Q", format=".1%", title="success"),
+        alt.Tooltip("difference:Q", format="+.1%", title="difference"),
+        alt.Tooltip("rival:N", title="to"),
+        alt.Tooltip("lower:Q", format="+.1%"),
+        alt.Tooltip("upper:Q", format="+.1%"),
+        alt.Tooltip("trials:Q"),
+        alt.Tooltip("count:Q", title="scenarios"),
+    ]
+    overall = alt.layer(
+        _heading([("Overall", 0.0)], scale),
+        rates.mark_rule(strokeWidth=9, opacity=0.28).encode(
+            alt.X("zero:Q", scale=scale, axis=None), alt.X2("rate:Q"), y=y, color=colour
+        ),
+        rates.mark_rule(strokeWidth=2, opacity=0.8).encode(
+            alt.X("low:Q", scale=scale, axis=None), alt.X2("high:Q"), y=y, color=colour
+        ),
+        rates.mark_point(filled=True, size=50, cursor="pointer").encode(
+            alt.X("rate:Q", scale=scale, axis=None), y=y, color=colour, tooltip=tooltip
+        ),
+        rates.transform_calculate(
+            text="format(100*datum.rate,'.0f')+' %'+(datum.whole==1?'':' *')"
+        )
+        .mark_text(align="right", fontSize=12, color="currentColor")
+        .encode(
+            x=alt.value(OVERALL_PX), y=y, text="text:N",
+            opacity=alt.condition("datum.tied==1", alt.value(1), alt.value(0.65)),
+        ),
+    ).properties(width=OVERALL_PX, height=alt.Step(ROW_PX), name="overall")  # fmt: skip
+    return alt.hconcat(
+        overall, _situations(controls, situations, by_success), spacing=14
+    ).resolve_scale(y="independent", color="independent")
+
+
+def _situations(controls: Sequence[Control], situations: Sequence[str], by_success: Any) -> Any:
+    """Draw the bars of outcomes, and the rate of success at the end of each."""
+    scale = alt.Scale(domain=[0, len(situations)], nice=False)
+    overall = (
+        weighted(counted_rows(controls))
+        .transform_joinaggregate(most="max(trials)")
+        .transform_calculate(sorted="(datum.trials==datum.most?1e7:0)+round(1e6*datum.rate)")
+        .transform_calculate(law_rate="datum.rate")
+    )
+    shares = (
+        weighted(overall, "situation")
+        .transform_aggregate(
+            share="sum(w)", n="count()", trials="max(trials)", rate="max(rate)",
+            sorted="max(sorted)", groupby=["law", "situation", "category"],
+        )
+        .transform_stack(
+            stack="share", as_=["a", "b"], groupby=["law", "situation"],
+            sort=[alt.SortField("category")],
+        )
+        .transform_calculate(
+            column=f"indexof({json.dumps(list(situations))},datum.situation)",
+            outcome=f"{json.dumps([each.name for each in CATEGORIES])}[datum.category]",
+            negative="-datum.sorted",
+        )
+        .transform_calculate(
+            left=f"datum.column+{BAR_SHARE}*datum.a", right=f"datum.column+{BAR_SHARE}*datum.b"
+        )
+        .transform_window(dense="dense_rank()", sort=[alt.SortField("negative")])
+        .transform_filter("datum.dense<=toNumber(most)||datum.law==versus")
+    )  # fmt: skip
+    y = alt.Y("law:N", axis=None, sort=by_success)
+    bars = shares.mark_bar(
+        height={"band": 0.72}, cursor="pointer", stroke="currentColor", strokeWidth=0.4,
+        strokeOpacity=0.5,
+    ).encode(
+        alt.X("left:Q", scale=scale, axis=None), alt.X2("right:Q"), y=y,
+        color=alt.Color(
+            "outcome:N",
+            scale=alt.Scale(
+                domain=[each.name for each in CATEGORIES], range=[*PALETTE],
+            ),
+            legend=alt.Legend(
+                orient="top", offset=26, title=None, direction="horizontal", labelFontSize=12,
+                symbolType="square", columnPadding=12, labelLimit=0,
+            ),
+        ),
+        tooltip=[
+            alt.Tooltip("law:N"), alt.Tooltip("situation:N"), alt.Tooltip("outcome:N"),
+            alt.Tooltip("share:Q", format=".0%"), alt.Tooltip("n:Q", title="trials"),
+            alt.Tooltip("trials:Q", title="of"),
+        ],
+    )  # fmt: skip
+    numbers = (
+        shares.transform_aggregate(
+            rate="max(rate)", sorted="max(sorted)", groupby=["law", "situation", "column"]
+        )
+        .transform_calculate(x="datum.column+0.93", text="format(100*datum.rate,'.0f')")
+        .mark_text(align="right", fontSize=11, color="currentColor")
+        .encode(
+            alt.X("x:Q", scale=scale, axis=None), y=y, text="text:N",
+            opacity=alt.condition("datum.rate>0.995", alt.value(1), alt.value(0.65)),
+        )
+    )  # fmt: skip
+    heads = _heading([(each, float(place)) for place, each in enumerate(situations)], scale)
+    return alt.layer(bars, numbers, heads).properties(
+        width=SITUATION_PX * len(situations), height=alt.Step(ROW_PX), name="matrix"
+    )
+
+
+PALETTE: Final = (
+    GOOD, "#6FA8DC", "#F9E7B0", "#E8A33D", BAD, "#4B0082", "#BFC9D1", "#111111",
+)  # fmt: skip
+"""Colours of `CATEGORIES`: told apart by the colour-blind too, side by side."""
+
+
+def _heading(texts: Sequence[tuple[str, float]], scale: alt.Scale) -> alt.Chart:
+    """Write headings above the rows, at their places."""
+    data = alt.InlineData([{"text": text, "x": place} for text, place in texts])
+    return (
+        alt.Chart(data)
+        .mark_text(fontSize=12, fontWeight="bold", align="left", baseline="bottom", dy=-5,
+                   color="currentColor")
+        .encode(alt.X("x:Q", scale=scale, axis=None), y=alt.value(0), text="text:N")
+    )  # fmt: skip

@@ -1,0 +1,66 @@
+"""What the page embeds to be played: charts, rows and runs, in few bytes."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+from dikbench.report.interactive.charts import ROWS
+from dikbench.report.interactive.page_rows import as_columns, page_rows
+from dikbench.report.interactive.specification import Charts, bundle, make_charts
+from dikbench.report.selection.categories import CATEGORIES
+from dikbench.statistics.first_places import FEWEST_SCENARIOS
+
+
+@dataclass(frozen=True, eq=False)
+class Embedded:
+    """What the page embeds.
+
+    Attributes:
+        charts: the charts and their controls.
+        data: what the page's script reads, JSON that may stand in a page.
+        bundle: Vega, a script.
+    """
+
+    charts: Charts
+    data: str
+    bundle: str
+
+
+def embed(trials: pd.DataFrame) -> Embedded | None:
+    """Make what the page embeds of trials; None where none of them counts (see `page_rows`)."""
+    if trials["feasible"].fillna("").eq("").all():
+        return None
+    rows = page_rows(trials)
+    if rows.empty:
+        return None
+    charts = make_charts(rows)
+    data = {
+        "specification": charts.specification,
+        "rows": ROWS,
+        "columns": packed(as_columns(rows)),
+        "controls": [each.name for each in charts.controls],
+        "phase": [each.name for each in charts.phase],
+        "ranking": charts.ranking,
+        "trials": charts.trials,
+        "categories": [each.name for each in CATEGORIES],
+        "fewest": FEWEST_SCENARIOS,
+        "runs": {},
+    }
+    return Embedded(charts, in_page(data), bundle().replace("</script", "<\\/script"))
+
+
+def packed(data: Any) -> str:
+    """Write data as JSON, compressed, in base64."""
+    text = json.dumps(data, separators=(",", ":"))
+    return base64.b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode()
+
+
+def in_page(data: Any) -> str:
+    """Write data as JSON that may stand in an element of a page: nothing in it ends the element."""
+    return json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
