@@ -30,4 +30,4 @@ def with_payload(robot: Robot, mass: float, radius: float = 0.05) -> Robot:
     frame = model.frames[robot.frame_id]
     ball = pin.Inertia.FromSphere(mass, radius)
     model.appendBodyToJoint(frame.parentJoint, ball, frame.placement)
-    return replace(robot, model=model)
+    return replace(robot, model=model, payload_radius=radius)

@@ -44,6 +44,7 @@ class Robot:
             a mesh is missing; None where the robot has none.
         urdf: the file of the model and its collision geometry; None if built in code.
         srdf: the file that lists which links cannot collide, or None.
+        payload_radius: radius of the ball that it carries about the task frame [m]; 0 for none.
     """
 
     name: str
@@ -58,6 +59,7 @@ class Robot:
     visuals: Callable[[], Any] | None = None
     urdf: str | None = None
     srdf: str | None = None
+    payload_radius: float = 0.0
 
     def __post_init__(self) -> None:
         """Check and copy the start and make it read-only: all trials share it."""

@@ -9,17 +9,30 @@ from dikbench.study.trial import NO_SOLVER
 from dikbench.viewer.limit_use import NEAR_SHARE, Nearness
 from dikbench.viewer.recording import Recording
 
-COLOURS: Final = {Nearness.INSIDE: 0x009E73, Nearness.NEAR: 0xF0C000, Nearness.PAST: 0xC00030}
-"""Colours of joints and of the path of the task frame; they differ in brightness, too."""
+Rgb = tuple[int, int, int]
+"""Red, green, blue, 0 to 255."""
 
-TARGET_COLOUR: Final = 0x0072B2
+GREY: Final[Rgb] = (158, 168, 181)
+
+COLOURS: Final[dict[Nearness, Rgb]] = {
+    Nearness.INSIDE: GREY,
+    Nearness.NEAR: (0xF0, 0xC0, 0x00),
+    Nearness.PAST: (0xD5, 0x5E, 0x00),
+}
+"""Colours of links; they differ in brightness, too."""
+
+TARGET_COLOUR: Final[Rgb] = (0x00, 0x72, 0xB2)
 """Colour of the path of the target."""
+
+OBSTACLE_COLOUR: Final[Rgb] = (0x8F, 0x7F, 0xB5)
+
+PAYLOAD_COLOUR: Final[Rgb] = (0x00, 0x9E, 0x73)
 
 LEGEND: Final = (
     (TARGET_COLOUR, "blue: path of the target, with the large axes (x red, y green, z blue)"),
-    (COLOURS[Nearness.INSIDE], "green: path of the task frame, joints; inside all limits"),
-    (COLOURS[Nearness.NEAR], f"yellow: from {100 * NEAR_SHARE:.0f} % of a position or speed limit"),
-    (COLOURS[Nearness.PAST], "red: past a limit"),
+    (COLOURS[Nearness.INSIDE], "grey: links and path of the task frame, inside all limits"),
+    (COLOURS[Nearness.NEAR], f"yellow: from {100 * NEAR_SHARE:.0f} % of a limit"),
+    (COLOURS[Nearness.PAST], "orange: past a limit"),
 )
 """Colours and their meaning."""
 

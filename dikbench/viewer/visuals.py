@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+import coal
 import numpy as np
 import pinocchio as pin
 
@@ -14,6 +15,9 @@ GREY_RGBA: Final = (0.62, 0.66, 0.71, 1.0)
 
 CAPSULE_RADIUS_SHARE: Final = 0.02
 """Radius of a capsule, as a share of the arm's length."""
+
+DISC_RADIUS_M, DISC_HEIGHT_M = 0.2, 0.1
+"""Size of what stands for a robot without links, such as a mobile base."""
 
 
 def bodies(robot: Robot) -> Any:
@@ -33,7 +37,10 @@ def bodies(robot: Robot) -> Any:
 
 
 def capsules(robot: Robot) -> Any:
-    """Build capsules from the base through the joints to the task frame."""
+    """Build capsules from the base through the joints to the task frame.
+
+    A robot all of whose joints are in one place is a disc.
+    """
     model, geometry = robot.model, pin.GeometryModel()
     tip = model.frames[robot.frame_id]
     ends = [
@@ -51,4 +58,9 @@ def capsules(robot: Robot) -> Any:
         link = pin.GeometryObject(f"link{number}", joint, placement, shape)
         link.meshColor = np.array(GREY_RGBA)
         geometry.addGeometryObject(link)
+    if not geometry.ngeoms:
+        shape = coal.Cylinder(DISC_RADIUS_M, DISC_HEIGHT_M)
+        disc = pin.GeometryObject("disc", tip.parentJoint, pin.SE3.Identity(), shape)
+        disc.meshColor = np.array(GREY_RGBA)
+        geometry.addGeometryObject(disc)
     return geometry

@@ -31,10 +31,10 @@ ROOMS: Final = (
     "statistics",
     "results",
     "run",
+    "viewer",
     "report",
     "tuning",
     "invariants",
-    "viewer",
     "cli",
 )
 """From the ground up: a room imports from those before it, and from nothing behind it."""

@@ -7,16 +7,14 @@ from typing import Any, Final
 
 import matplotlib.pyplot as plt
 import numpy as np
-import pinocchio as pin
 
-from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_scenario
 from dikbench.problem.constraints import CollisionConstraint
 from dikbench.report.drawing.obstacle_surface import surface
 from dikbench.report.drawing.style import COLOURS, style
 from dikbench.robots.collision.obstacles import Obstacle
-from dikbench.robots.robot import Robot
+from dikbench.robots.stick_figure import stick
 from dikbench.scenario.scenario import Scenario
 
 FORMATS: Final = (".svg", ".png", ".pdf")
@@ -106,15 +104,6 @@ def _obstacles(scenario: Scenario) -> list[Obstacle]:
         if isinstance(constraint, CollisionConstraint)
         for obstacle in constraint.obstacles
     ]
-
-
-def stick(robot: Robot, q: Array) -> Array:
-    """Origins of the joints that carry the task frame, from the base on, and its own, (k, 3)."""
-    model, data = robot.model, robot.model.createData()
-    pin.forwardKinematics(model, data, q)
-    tip = pin.updateFramePlacement(model, data, robot.frame_id).translation
-    joints = model.supports[model.frames[robot.frame_id].parentJoint]
-    return np.array([*(data.oMi[joint].translation for joint in joints), tip])
 
 
 def _draw_difficulty(panels: list[Any], scenario: Scenario) -> None:

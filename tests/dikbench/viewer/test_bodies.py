@@ -9,10 +9,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from dikbench.report.figures.scenario_drawing import stick
 from dikbench.robots.catalogue import ROBOTS
 from dikbench.robots.example_robot_data import DataModel
 from dikbench.robots.loading import load_robot
+from dikbench.robots.stick_figure import stick
 from dikbench.viewer.visuals import bodies, capsules
 
 ARM = """<robot name="arm">
@@ -66,9 +66,11 @@ def test_capsules_reach_from_joint_to_joint(name: str) -> None:
     np.testing.assert_allclose(ends[: len(legs)], legs, atol=1e-12)
 
 
-def test_a_point_has_no_capsule() -> None:
-    """A mobile base is one joint without a length: nothing to draw, and no error."""
-    assert bodies(load_robot("base")).ngeoms == 0
+def test_a_point_is_a_disc() -> None:
+    """A mobile base is one joint without a length: a disc that moves with it stands for it."""
+    (disc,) = bodies(load_robot("base")).geometryObjects
+    assert disc.parentJoint == 1
+    assert disc.geometry.radius > disc.geometry.halfLength > 0
 
 
 def test_a_urdf_s_own_shapes(tmp_path: Path) -> None:

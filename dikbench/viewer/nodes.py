@@ -1,0 +1,204 @@
+"""The nodes of a scene: robot, target, obstacles, payload; and from where it is seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from dikbench.arrays import Array
+from dikbench.problem.constraints import CollisionConstraint
+from dikbench.robots.collision.obstacles import (
+    BoxObstacle,
+    CapsuleObstacle,
+    Obstacle,
+    SphereObstacle,
+)
+from dikbench.robots.robot import Robot
+from dikbench.robots.stick_figure import stick
+from dikbench.scenario.scenario import Scenario
+from dikbench.viewer.legend import GREY, OBSTACLE_COLOUR, PAYLOAD_COLOUR, Rgb
+from dikbench.viewer.moving_joints import ROBOT_NODE, body_node, joint_nodes, wxyz
+from dikbench.viewer.simplified_meshes import simplified_meshes
+
+if TYPE_CHECKING:
+    import viser
+
+TARGET_NODE: Final = "/target"
+"""Node of the frame that the task frame is to follow."""
+
+PATH_NODE: Final = "/path"
+"""Node of the path of the target."""
+
+OBSTACLES_NODE: Final = "/obstacles"
+"""Node of the obstacles, which are below it by their number."""
+
+PATH_POINTS: Final = 200
+
+CAMERA_YAW_RAD: Final = np.deg2rad(50)
+"""Angle about the vertical from the direction of the path to that of the camera."""
+
+FIELD_OF_VIEW_RAD: Final = 0.75
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Where one looks from, and at what, (3,) [m] each."""
+
+    position: tuple[float, ...]
+    look_at: tuple[float, ...]
+
+    def place(self, server: viser.ViserServer) -> None:
+        """Make it the camera of a server's scene."""
+        server.initial_camera.position = np.array(self.position)
+        server.initial_camera.look_at = np.array(self.look_at)
+        server.initial_camera.fov = FIELD_OF_VIEW_RAD
+
+
+def tool_node(robot: Robot, robot_node: str = ROBOT_NODE) -> str:
+    """Return the name of the node of the task frame."""
+    joint = robot.model.frames[robot.frame_id].parentJoint
+    return f"{joint_nodes(robot.model, robot_node)[joint]}/tool"
+
+
+def add_robot(scene: viser.SceneApi, robot: Robot, robot_node: str = ROBOT_NODE) -> list[str]:
+    """Add a robot at its neutral configuration: nested frames, a mesh per joint, the task frame.
+
+    Returns:
+        The names of the nodes of the meshes by Pinocchio's index of their joint, the universe
+        first; empty where a joint carries none.
+    """
+    model, nodes = robot.model, joint_nodes(robot.model, robot_node)
+    for node, placement in zip(nodes, model.jointPlacements, strict=True):
+        scene.add_frame(
+            node,
+            show_axes=False,
+            position=placement.translation,
+            wxyz=np.array(wxyz(placement.rotation)),
+        )
+    names = [""] * model.njoints
+    for joint, mesh in simplified_meshes(robot).items():
+        names[joint] = body_node(nodes[joint])
+        scene.add_mesh_simple(
+            names[joint],
+            mesh.vertices.astype(np.float32),
+            mesh.faces.astype(np.uint32),
+            color=GREY,
+            flat_shading=True,
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+    frame, size = model.frames[robot.frame_id], _size(robot)
+    scene.add_frame(
+        tool_node(robot, robot_node),
+        position=frame.placement.translation,
+        wxyz=np.array(wxyz(frame.placement.rotation)),
+        axes_length=0.08 * size,
+        axes_radius=0.005 * size,
+    )
+    return names
+
+
+def add_target(scene: viser.SceneApi, robot: Robot, node: str = TARGET_NODE) -> None:
+    """Add the frame of the target, in the world's place."""
+    size = _size(robot)
+    scene.add_frame(node, axes_length=0.14 * size, axes_radius=0.004 * size)
+
+
+def add_payload(scene: viser.SceneApi, robot: Robot, robot_node: str = ROBOT_NODE) -> None:
+    """Add the ball that a robot carries, if it does, below the node of its task frame."""
+    if robot.payload_radius > 0:
+        _add_ball(
+            scene,
+            f"{tool_node(robot, robot_node)}/payload",
+            np.zeros(3),
+            robot.payload_radius,
+            PAYLOAD_COLOUR,
+        )
+
+
+def add_obstacles(
+    scene: viser.SceneApi, scenario: Scenario, obstacles_node: str = OBSTACLES_NODE
+) -> None:
+    """Add the obstacles of a scenario."""
+    for number, obstacle in enumerate(obstacles_of(scenario)):
+        node = f"{obstacles_node}/{number}"
+        _, placement = obstacle.geometry()
+        at, turn = placement.translation, np.array(wxyz(placement.rotation))
+        if isinstance(obstacle, SphereObstacle):
+            _add_ball(scene, node, at, obstacle.radius, OBSTACLE_COLOUR)
+        elif isinstance(obstacle, BoxObstacle):
+            scene.add_box(
+                node, OBSTACLE_COLOUR, obstacle.size, position=at, wxyz=turn, cast_shadow=False
+            )
+        else:
+            _add_capsule(scene, node, obstacle, at, turn)
+
+
+def obstacles_of(scenario: Scenario) -> list[Obstacle]:
+    """List the obstacles of all constraints of a scenario."""
+    return [
+        obstacle
+        for constraint in scenario.constraints
+        if isinstance(constraint, CollisionConstraint)
+        for obstacle in constraint.obstacles
+    ]
+
+
+def path_points(scenario: Scenario) -> Array:
+    """Compute points of the path of the target, (k, 3) [m]; one where it stands still."""
+    reference = scenario.reference
+    count = PATH_POINTS if reference.moving else 1
+    return reference.placements(np.linspace(0.0, reference.duration, count))[1]
+
+
+def camera_of(robot: Robot, points: Array) -> Camera:
+    """Choose a camera that sees points (k, 3) [m] of a robot and its way, from the path's side."""
+    middle = (points.max(axis=0) + points.min(axis=0)) / 2
+    size = max(float(np.linalg.norm(np.ptp(points, axis=0))), 0.3)
+    x, y, _ = points[-1]
+    towards = np.arctan2(y, x) - CAMERA_YAW_RAD
+    side = np.array([np.cos(towards), np.sin(towards), 0.55])
+    if 2 not in robot.movable_rows:  # a planar arm is seen from above
+        side = np.array([0.0, -0.01, 1.15])
+    position = middle + 1.35 * size * side
+    return Camera(tuple(np.round(position, 4).tolist()), tuple(np.round(middle, 4).tolist()))
+
+
+def robot_points(robot: Robot, q: Array) -> Array:
+    """Return points (k, 3) [m] of a robot at configurations (n, nq): its base and its joints."""
+    return np.vstack([np.zeros((1, 3)), *(stick(robot, each) for each in q)])
+
+
+def _size(robot: Robot) -> float:
+    """Estimate how large a robot is [m]."""
+    return max(float(np.linalg.norm(np.ptp(robot_points(robot, robot.q0[None]), axis=0))), 0.5)
+
+
+def _add_ball(scene: viser.SceneApi, node: str, at: Array, radius: float, colour: Rgb) -> None:
+    scene.add_icosphere(node, radius, colour, position=at, cast_shadow=False, receive_shadow=False)
+
+
+def _add_capsule(
+    scene: viser.SceneApi, node: str, capsule: CapsuleObstacle, at: Array, turn: Array
+) -> None:
+    length = float(np.linalg.norm(np.subtract(capsule.end, capsule.start)))
+    scene.add_cylinder(
+        node,
+        capsule.radius,
+        length,
+        OBSTACLE_COLOUR,
+        position=at,
+        wxyz=turn,
+        cast_shadow=False,
+        receive_shadow=False,
+    )
+    for name, end in (("start", -length / 2), ("end", length / 2)):
+        _add_ball(
+            scene,
+            f"{node}/{name}",
+            np.array([0.0, 0.0, end]),
+            capsule.radius,
+            OBSTACLE_COLOUR,
+        )
