@@ -26,8 +26,8 @@ CHOSEN: Final = "#B4468F"
 BAD: Final = "#C8502B"
 
 ROW_PX: Final = 20
-OVERALL_PX: Final = 180
-SITUATION_PX: Final = 144
+OVERALL_PX: Final = 170
+SITUATION_PX: Final = 126
 BAR_SHARE: Final = 0.74
 """Of a situation's width; its number takes the rest."""
 
@@ -73,7 +73,8 @@ def ranked(controls: Sequence[Control]) -> alt.Chart:
     """Rank the laws by success, each compared with the best or with the law of `versus`.
 
     A row per law: rate, trials, whole (whether it ran every case), difference, lower, upper (the
-    paired interval: of independent scenarios), tied, place. Who did not run every case is not
+    paired interval: of independent scenarios), tied (first, by the rule of
+    `statistics.success.rates`), standing (its place in words). Who did not run every case is not
     ranked, nor anybody where fewer than `FEWEST_SCENARIOS` scenarios count.
     """
     return (
@@ -112,12 +113,21 @@ def ranked(controls: Sequence[Control]) -> alt.Chart:
             groupby=["whole"],
         )
         .transform_calculate(
-            tied="datum.whole==1&&datum.enough==1&&datum.rate>0"
-            f"&&datum.rate>=datum.best-{MOST_BEHIND}"
-            "&&(versus!='best'?datum.rate==datum.best:datum.difference+datum.half>=0)?1:0"
+            apart="datum.whole==1&&versus=='best'&&datum.difference+datum.half<0?datum.rate:0"
         )
+        .transform_joinaggregate(apart="max(apart)")
+        .transform_calculate(
+            tied="datum.whole==1&&datum.enough==1&&datum.rate>0&&datum.rate>=datum.apart"
+            f"&&datum.rate>=datum.best-{MOST_BEHIND}"
+            "&&(versus=='best'||datum.rate==datum.best)?1:0"
+        )
+        .transform_joinaggregate(ties="sum(tied)", laws="count()")
         .transform_window(
             place="rank()", dense="dense_rank()", sort=[alt.SortField("rounded", "descending")]
+        )
+        .transform_calculate(
+            standing="datum.whole==0||datum.enough==0?'not ranked':datum.tied==1&&datum.ties>1"
+            "?'1 to '+datum.ties:''+datum.place"
         )
         .transform_filter("datum.dense<=toNumber(most)||datum.law==versus")
     )  # fmt: skip

@@ -106,7 +106,9 @@ def filter_of(every: Sequence[Control]) -> str:
     return "&&".join(f"({each.test})" for each in every if each.test) or "true"
 
 
-def _list(name: str, label: str, options: Sequence[str | tuple[str, str]], test: str = "") -> Control:
+def _list(
+    name: str, label: str, options: Sequence[str | tuple[str, str]], test: str = ""
+) -> Control:
     pairs = tuple((each, each) if isinstance(each, str) else each for each in options)
     return Control(name, label, pairs, pairs[0][0], test)
 

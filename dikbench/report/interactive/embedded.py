@@ -13,8 +13,11 @@ import pandas as pd
 from dikbench.report.interactive.charts import ROWS
 from dikbench.report.interactive.page_rows import as_columns, page_rows
 from dikbench.report.interactive.specification import Charts, bundle, make_charts
+from dikbench.report.interactive.replays import make_replays
+from dikbench.report.interactive.trace_charts import trace_charts
 from dikbench.report.selection.categories import CATEGORIES
 from dikbench.statistics.first_places import FEWEST_SCENARIOS
+from dikbench.viewer.legend import COLOURS, TARGET_COLOUR
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +42,7 @@ def embed(trials: pd.DataFrame) -> Embedded | None:
     rows = page_rows(trials)
     if rows.empty:
         return None
-    charts = make_charts(rows)
+    charts, replays = make_charts(rows), make_replays(trials, rows)
     data = {
         "specification": charts.specification,
         "rows": ROWS,
@@ -48,9 +51,13 @@ def embed(trials: pd.DataFrame) -> Embedded | None:
         "phase": [each.name for each in charts.phase],
         "ranking": charts.ranking,
         "trials": charts.trials,
-        "categories": [each.name for each in CATEGORIES],
-        "fewest": FEWEST_SCENARIOS,
-        "runs": {},
+        "outcomes": [each.name for each in CATEGORIES],
+        "fewest": f"Nobody is ranked in this view: fewer than {FEWEST_SCENARIOS} scenarios.",
+        "runs": dict.fromkeys(replays["runs"], 1),
+        "replays": packed(replays),
+        "traces": trace_charts(),
+        "colours": list(COLOURS.values()),
+        "path_colour": TARGET_COLOUR,
     }
     return Embedded(charts, in_page(data), bundle().replace("</script", "<\\/script"))
 

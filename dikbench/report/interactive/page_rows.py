@@ -116,7 +116,9 @@ def variant(formulation: str) -> str:
         return "default" if at_defaults else "other"
     wanted = {k: tuned.parameters.get(k, tunable[k].default) for k in tunable}
     is_tuned = {k: given.get(k, tunable[k].default) for k in tunable} == wanted
-    return ("both" if at_defaults else "tuned") if is_tuned else "default" if at_defaults else "other"
+    return (
+        ("both" if at_defaults else "tuned") if is_tuned else "default" if at_defaults else "other"
+    )
 
 
 def _outcomes(rows: pd.DataFrame) -> list[str]:

@@ -36,7 +36,8 @@ def cost(controls: Sequence[Control]) -> alt.Chart:
         weighted(counted_rows(controls))
         .transform_filter("datum.done==1&&isValid(datum.error)&&isValid(datum.slow)")
         .transform_calculate(
-            of_error="datum.law==versus?datum.error:null", of_slow="datum.law==versus?datum.slow:null"
+            of_error="datum.law==versus?datum.error:null",
+            of_slow="datum.law==versus?datum.slow:null",
         )
         .transform_joinaggregate(error_of="max(of_error)", slow_of="max(of_slow)", groupby=_CASE)
         .transform_filter(common)
@@ -66,10 +67,12 @@ def deadline(controls: Sequence[Control]) -> Any:
                       "success", "What success costs", "deadline", log_y=False)  # fmt: skip
     line = (
         alt.Chart(alt.InlineData([{}]))
-        .transform_calculate(at="rate=='any'?null:toNumber(rate)")
-        .transform_filter("isValid(datum.at)")
+        .transform_calculate(at="rate=='any'?1000:toNumber(rate)", seen="rate=='any'?0:1")
         .mark_rule(color=BAD, strokeDash=[4, 3])
-        .encode(x=alt.X("at:Q", scale=alt.Scale(type="log")))
+        .encode(
+            alt.X("at:Q", scale=alt.Scale(type="log")),
+            opacity=alt.condition("datum.seen==1", alt.value(1), alt.value(0)),
+        )
     )
     return alt.layer(points, line).properties(name="deadlines")
 
@@ -79,9 +82,7 @@ def _scatter(
 ) -> alt.Chart:
     """Draw a point for each law, named where there is room."""
     across = alt.X("x:Q", title=x, scale=alt.Scale(type="log", nice=False, padding=14))
-    scale = (
-        alt.Scale(type="log", nice=False, padding=12) if log_y else alt.Scale(domain=[0, 1])
-    )
+    scale = alt.Scale(type="log", nice=False, padding=12) if log_y else alt.Scale(domain=[0, 1])
     return (
         found.mark_circle(cursor="pointer", opacity=0.6, stroke="currentColor", strokeWidth=0.4)
         .encode(
@@ -151,7 +152,9 @@ def phase(controls: Sequence[Control]) -> Any:
             "?format(datum.error,'.2~g'):format(datum.peak,'.3~g')",
         )
     )  # fmt: skip
-    x = alt.X("across:O", title="distance from the singularity (m, rad)", axis=alt.Axis(labelAngle=0))
+    x = alt.X(
+        "across:O", title="distance from the singularity (m, rad)", axis=alt.Axis(labelAngle=0)
+    )
     y = alt.Y("up:O", sort="descending", title="speed")
     tooltip = [
         alt.Tooltip("across:O"), alt.Tooltip("up:O"), alt.Tooltip("success:Q", format=".0%"),

@@ -17,9 +17,11 @@ from markupsafe import Markup
 
 from dikbench.report.contents.contents import Contents
 from dikbench.report.drawing.figure import Figure
+from dikbench.report.interactive.chosen_runs import RULE
 from dikbench.report.interactive.embedded import Embedded
 from dikbench.report.pages.backticks import to_html
 from dikbench.report.tables.table import Column, TableCell, shown
+from dikbench.viewer.static_scene import replay_script
 
 PLAYED: Final = ("play", "Matrix")
 SECTIONS: Final = (
@@ -99,6 +101,7 @@ def render_html(contents: Contents, figures: Path, embedded: Embedded | None) ->
         "sections": SECTIONS if embedded is None else (PLAYED, *SECTIONS),
         "assets": _assets(),
         "charts": None if embedded is None else embedded.charts,
+        "rule": RULE,
         "page_data": Markup("" if embedded is None else embedded.data),
         "bundle": Markup("" if embedded is None else embedded.bundle),
     }
@@ -132,7 +135,10 @@ def _td(cell: TableCell, column: Column) -> Markup:
 def _assets() -> Assets:
     folder = resources.files("dikbench.report.pages") / "assets"
     style = (folder / "report.css").read_text(encoding="utf-8")
-    return Assets(Markup(style), Markup((folder / "page.js").read_text(encoding="utf-8")))
+    return Assets(
+        Markup(style),
+        Markup(f"{replay_script()}\n{(folder / 'page.js').read_text(encoding='utf-8')}"),
+    )
 
 
 def _inlined(figures: Sequence[Figure], folder: Path, room: int) -> list[Inlined]:

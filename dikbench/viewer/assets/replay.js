@@ -3,11 +3,13 @@
 
 // Open the client (client_html) in an element, with the scene of a robot (StaticScene.data).
 function openScene(host, client, data, dark) {
-  const frame = document.createElement("iframe");
-  const head = `<head><script>window.__VISER_EMBED_DATA__="${data}";` +
+  const frame = document.createElement("iframe"), nonce = document.querySelector("script[nonce]")?.nonce ?? "";
+  const head = `<head><script nonce="${nonce}">window.__VISER_EMBED_DATA__="${data}";` +
     `window.__VISER_EMBED_CONFIG__={darkMode:${Boolean(dark)}};</scr` + `ipt>` +
     `<style>[class*=Notification],[aria-label="Show scene tree"]{display:none!important}</style>`;
-  frame.srcdoc = client.replace("<head>", () => head);
+  // A page that lets no script through but those with its nonce: the client's own, and what it adds.
+  frame.srcdoc = client.replaceAll("<script ", () => `<script nonce="${nonce}" `)
+    .replaceAll('("script");e.', () => `("script");e.nonce="${nonce}";e.`).replace("<head>", () => head);
   host.replaceChildren(frame);
   return frame;
 }

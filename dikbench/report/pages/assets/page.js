@@ -1,53 +1,61 @@
 // Glue between the controls, Vega's charts and viser's replays: what is computed is declared in Python.
 const $ = (id) => document.getElementById(id);
-const element = (tag, text = "", attributes = {}) =>
-  Object.assign(document.createElement(tag), { textContent: text }, attributes);
-const number = (value, digits = 3) => (value == null ? "" : String(Number(value.toPrecision(digits))));
+const digits = (value, most = 3) => (value == null ? "" : Number(value.toPrecision(most)));
 const percent = (value) => (100 * value).toFixed(1);
+const later = (milliseconds) => new Promise((go) => setTimeout(go, milliseconds));
+const page = JSON.parse($("page-data")?.textContent ?? "null");
 
-// Every heading of a sortable table is a button that sorts its rows; numbers before texts.
-function sortable(table) {
-  for (const heading of table.tHead.rows[0].cells) {
-    const button = element("button", "", { type: "button" });
-    button.append(...heading.childNodes);
-    heading.append(button);
-    button.addEventListener("click", () => {
-      const falls = heading.getAttribute("aria-sort") === "descending";
-      for (const other of table.tHead.rows[0].cells) other.removeAttribute("aria-sort");
-      heading.setAttribute("aria-sort", falls ? "ascending" : "descending");
-      const key = (row) => {
-        const cell = row.cells[heading.cellIndex];
-        const text = cell.dataset.sort ?? cell.textContent;
-        return text.trim() === "" || Number.isNaN(Number(text)) ? text : Number(text);
-      };
-      const compare = (a, b) =>
-        typeof a === typeof b ? (a < b ? -1 : a > b ? 1 : 0) : typeof a === "number" ? -1 : 1;
-      const last = (a) => (a === "" ? 1 : 0);
-      const rows = Array.from(table.tBodies[0].rows, (row) => [key(row), row]);
-      rows.sort(([a], [b]) => last(a) - last(b) || (falls ? compare(a, b) : compare(b, a)));
-      table.tBodies[0].append(...rows.map(([, row]) => row));
-    });
-  }
+function button(text, act) {
+  const made = Object.assign(document.createElement("button"), { type: "button", textContent: text });
+  made.addEventListener("click", act);
+  return made;
 }
-document.querySelectorAll("table.sortable").forEach(sortable);
+
+// Fill a table: the second cell of a row is its heading, texts stand left.
+function fill(table, rows) {
+  table.tBodies[0].replaceChildren(...rows.map((cells) => {
+    const line = document.createElement("tr");
+    cells.forEach((content, place) => {
+      const cell = document.createElement(place === 1 ? "th" : "td");
+      if (typeof content !== "number") cell.className = "name";
+      cell.append(content);
+      line.append(cell);
+    });
+    return line;
+  }));
+}
+
+// A heading of a sortable table is a button that sorts its rows: numbers first, what is empty last.
+for (const heading of document.querySelectorAll("table.sortable > thead th")) {
+  const sort = button("", () => {
+    const table = heading.closest("table"), falls = heading.getAttribute("aria-sort") === "descending";
+    for (const other of table.tHead.rows[0].cells) other.removeAttribute("aria-sort");
+    heading.setAttribute("aria-sort", falls ? "ascending" : "descending");
+    const rows = Array.from(table.tBodies[0].rows, (row) => {
+      const cell = row.cells[heading.cellIndex], text = (cell.dataset.sort ?? cell.textContent).trim();
+      return [row, text === "" ? 2 : Number.isNaN(parseFloat(text)) ? 1 : 0, text];
+    });
+    const compare = (a, b) => (a[1] ? a[2].localeCompare(b[2]) : parseFloat(a[2]) - parseFloat(b[2])) * (falls ? 1 : -1);
+    rows.sort((a, b) => a[1] - b[1] || (a[1] < 2 ? compare(a, b) : 0));
+    table.tBodies[0].append(...rows.map(([row]) => row));
+  });
+  sort.append(...heading.childNodes);
+  heading.append(sort);
+}
 
 // A row of the tables below stays where every word of the filter occurs in its names.
-function filterRows() {
+$("filter").addEventListener("input", () => {
   const words = $("filter").value.toLowerCase().split(/\s+/).filter(Boolean);
-  const rows = Array.from(document.querySelectorAll("#tables table > tbody > tr, .entry table > tbody > tr"));
+  const rows = [...document.querySelectorAll("section:not(#play) table.sortable > tbody > tr")];
   for (const row of rows) {
-    const names = Array.from(row.querySelectorAll(".name"), (cell) => cell.textContent).join(" ");
-    row.hidden = !words.every((word) => names.toLowerCase().includes(word));
+    const names = Array.from(row.querySelectorAll(".name"), (cell) => cell.textContent).join(" ").toLowerCase();
+    row.hidden = !words.every((word) => names.includes(word));
   }
   const left = rows.filter((row) => !row.hidden).length;
   $("rows-shown").textContent = words.length ? `${left} of ${rows.length} rows` : "";
-}
-$("filter").addEventListener("input", filterRows);
+});
 $("filtering").addEventListener("submit", (event) => event.preventDefault());
 $("filtering").hidden = false;
-
-const page = $("page-data") && JSON.parse($("page-data").textContent);
-if (page) play(page).catch((error) => ($("leading").textContent = `The charts cannot be shown: ${error}`));
 
 async function inflated(text) {
   const bytes = Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
@@ -55,128 +63,140 @@ async function inflated(text) {
   return JSON.parse(await new Response(stream).text());
 }
 
-function rowsOf(columns) {
-  const names = Object.keys(columns);
-  const value = ({ words, values }, place) => (words ? words[values[place]] : values[place]);
-  return columns[names[0]].values.map((_, place) =>
-    Object.fromEntries(names.map((name) => [name, value(columns[name], place)])),
-  );
-}
-
-async function play(page) {
-  const asked = [...page.controls, ...page.phase].filter((name) => $(name));
-  const initial = Object.fromEntries(asked.map((name) => [name, $(name).value]));
-  const linked = new URLSearchParams(location.hash.includes("=") ? location.hash.slice(1) : "");
+async function play() {
+  const asked = [...page.controls, ...page.phase], initial = {}, linked = new URLSearchParams(location.hash.slice(1));
   for (const name of asked) {
-    if (!linked.has(name)) continue;
-    $(name).value = linked.get(name);
-    if ($(name).value !== linked.get(name)) $(name).value = initial[name];
+    initial[name] = $(name).value;
+    if (linked.has(name)) $(name).value = linked.get(name);
+    if (!$(name).value) $(name).value = initial[name];
   }
-  page.specification.datasets = {};
-  const data = page.specification.data.find((each) => each.name === page.rows);
-  data.values = rowsOf(await inflated(page.columns));
+  const columns = Object.entries(await inflated(page.columns));
+  const value = ({ words, values }, k) => (words ? words[values[k]] : values[k]);
+  const all = columns[0][1].values.map((_, k) =>
+    Object.fromEntries(columns.map(([name, column]) => [name, value(column, k)])));
+  page.specification.data.find((each) => each.name === page.rows).values = all;
+  page.trial = new Map(all.map((row) => [row.id, row]));
   $("play").hidden = false;
   const options = { mode: "vega", renderer: "svg", actions: false };
   const { view } = await vegaEmbed("#charts", page.specification, options);
   const shown = { trial: linked.get("trial") ?? "", beside: linked.get("beside") ?? "" };
-  const update = () => told(page, view, asked, initial, shown);
-  for (const name of asked) $(name).addEventListener("input", () => setTimeout(() => view.runAsync().then(update)));
-  $("reset").addEventListener("click", () => {
-    for (const name of asked) {
-      $(name).value = initial[name];
-      view.signal(name, initial[name]);
-    }
-    view.runAsync().then(update);
-  });
-  const list = async (law, chosen = {}) => listed(page, await trialsOf(page, view, law), law, chosen, open);
-  const open = (trial) => {
-    shown.trial = trial;
-    update();
-    opened(page, shown, update);
+  const update = async () => {
+    await view.runAsync();
+    for (const slider of document.querySelectorAll("#controls input"))
+      slider.previousElementSibling.value = slider.dataset.texts.split("|")[slider.value];
+    const rows = view.data(page.ranking).toSorted((a, b) => a.place - b.place || a.law.localeCompare(b.law));
+    fill($("ranking"), rows.map((row) => [row.standing, row.law, Number(percent(row.rate)),
+      Number(percent(row.difference)), `${percent(row.lower)} to ${percent(row.upper)}`, row.trials,
+      button("show", () => list(row.law, {}))]));
+    const first = rows.filter((row) => row.tied).map((row) => `${row.law} (${percent(row.rate)} %)`);
+    $("leading").textContent = !rows.length ? "No trial is left: choose less." : !rows[0].enough ? page.fewest
+      : !first.length ? "Nobody succeeds, or nobody ran every trial, in this view."
+      : `In this view ${first.slice(0, 5).join(", ")}${first.length > 5 ? ` and ${first.length - 5} more` : ""} ${
+        first.length > 1 ? "succeed most often and cannot be told apart" : "succeeds most often; the others can be told apart"}.`;
+    $("sample").textContent = rows.length ? `${rows[0].laws} formulations, ${Math.max(...rows.map((row) => row.trials))
+      } trials each, ${rows[0].count} scenarios` : "";
+    const state = asked.filter((name) => $(name).value !== initial[name]).map((name) => [name, $(name).value]);
+    state.push(...Object.entries(shown).filter(([, id]) => id));
+    history.replaceState(null, "", `#${new URLSearchParams(state)}`);
+  };
+  const open = async (trial, beside) => {
+    Object.assign(shown, { trial, beside });
+    await Promise.all([update(), opened(trial, beside, (other) => open(trial, other))]);
+  };
+  const list = async (law, { situation = "", category }) => {
+    await view.signal("picked", law).runAsync();
+    const rows = view.data(page.trials).toSorted((a, b) => b.category - a.category || b.farthest - a.farthest)
+      .filter((row) => [row.situation, ""].includes(situation) && [row.category, undefined].includes(category));
+    const show = (most) => fill($("trials").querySelector("table"), rows.slice(0, most).map((row) => [
+      page.outcomes[row.category], row.scenario, row.seed, row.reference, ...[row.farthest, row.error, row.peak].map(
+        (each) => digits(each)), button(row.id, () => open(row.id, "")), page.runs[row.id] ? "\u25B6" : ""]));
+    show(($("all-trials").checked = false) || 12);
+    $("all-trials").onchange = ({ target }) => show(target.checked ? Infinity : 12);
+    $("trials-title").textContent = `${law}${situation && `, ${situation}`}: ${rows.length} trials, the worst first`;
+    $("trials").hidden = false;
+    $("trials-title").focus();
   };
   view.addEventListener("click", (_, item) => item?.datum?.law && list(item.datum.law, item.datum));
-  $("ranking").tBodies[0].addEventListener("click", ({ target }) => target.dataset.law && list(target.dataset.law));
-  update();
-  if (shown.trial) opened(page, shown, update);
+  for (const name of asked) $(name).addEventListener("input", () => later(0).then(update));
+  $("reset").addEventListener("click", () => {
+    for (const name of asked) view.signal(name, ($(name).value = initial[name]));
+    update();
+  });
+  await (shown.trial ? open(shown.trial, shown.beside) : update());
 }
 
-// The sample, the leading laws and the ranking of the view; its state in the address.
-function told(page, view, asked, initial, shown) {
-  for (const output of document.querySelectorAll("#controls label output")) {
-    const slider = $(output.htmlFor.value);
-    output.textContent = slider.dataset.texts.split("|")[slider.value];
-  }
-  const rows = view.data(page.ranking).toSorted((a, b) => a.place - b.place || a.law.localeCompare(b.law));
-  const first = rows.filter((row) => row.tied);
-  const [trials, scenarios] = rows.length ? [rows.map((row) => row.trials), rows[0].count] : [[0], 0];
-  const most = Math.max(...trials);
-  $("sample").textContent = `${rows.length} formulations, ${most} trials each, ${scenarios} scenarios`;
-  const named = first.slice(0, 6).map((row) => `${row.law} (${percent(row.rate)} %)`).join(", ");
-  const more = first.length > 6 ? ` and ${first.length - 6} more` : "";
-  $("leading").textContent = !rows.length
-    ? "No trial is left: choose less."
-    : scenarios < page.fewest
-      ? `Nobody is ranked: fewer than ${page.fewest} scenarios.`
-      : !first.length
-        ? "Nobody succeeds in this view."
-        : first.length === 1
-          ? `In this view ${named} succeeds most often; the others can be told apart from it.`
-          : `In this view ${named}${more} succeed most often and cannot be told apart.`;
-  const body = $("ranking").tBodies[0];
-  body.replaceChildren(...rows.map((row) => {
-    const place = !row.whole || scenarios < page.fewest ? "" : row.tied ? `1 to ${first.length}` : row.place;
-    const line = element("tr");
-    const button = element("button", "show", { type: "button" });
-    button.dataset.law = row.law;
-    const sorted = element("td", place === "" ? "not ranked" : first.length === 1 && row.tied ? "1" : place);
-    sorted.dataset.sort = place === "" ? "" : row.tied ? 1 : row.place;
-    const last = element("td", "", { className: "name" });
-    last.append(button);
-    line.append(
-      sorted, element("th", row.law, { className: "name", scope: "row" }), element("td", percent(row.rate)),
-      element("td", percent(row.difference)), element("td", `${percent(row.lower)} to ${percent(row.upper)}`),
-      element("td", row.trials), last,
-    );
-    return line;
-  }));
-  const state = asked.filter((name) => $(name).value !== initial[name]).map((name) => [name, $(name).value]);
-  for (const name of ["trial", "beside"]) if (shown[name]) state.push([name, shown[name]]);
-  const text = new URLSearchParams(state).toString();
-  if (text || location.hash.includes("=")) history.replaceState(null, "", text ? `#${text}` : location.pathname);
-}
-
-async function trialsOf(page, view, law) {
-  await view.signal("picked", law).runAsync();
-  return view.data(page.trials);
-}
-
-// The trials of a law in this view, the worst first, those of one situation where it was chosen.
-function listed(page, rows, law, { situation = "", category = null }, open) {
-  const chosen = rows
-    .filter((row) => (!situation || row.situation === situation) && (category === null || row.category === category))
-    .toSorted((a, b) => b.category - a.category || (b.farthest ?? 1e9) - (a.farthest ?? 1e9));
-  const body = $("trials").querySelector("tbody");
-  const fill = (most) => {
-    body.replaceChildren(...chosen.slice(0, most).map((row) => {
-      const button = element("button", `${row.id}${page.runs[row.id] === undefined ? "" : " \u25B6"}`, { type: "button" });
-      button.addEventListener("click", () => open(row.id));
-      const line = element("tr");
-      const last = element("td", "", { className: "name" });
-      last.append(button);
-      line.append(
-        element("th", row.scenario, { className: "name", scope: "row" }),
-        element("td", page.categories[row.category], { className: "name" }), element("td", row.seed),
-        element("td", row.reference, { className: "name" }), element("td", number(row.farthest)),
-        element("td", number(row.error)), element("td", number(row.peak)), last,
-      );
-      return line;
-    }));
-    $("more-trials").hidden = chosen.length <= most;
+// Open a trial: its commands, and where its run is carried the replay, beside another one's.
+let replays, stop = () => {};
+async function opened(trial, beside, choose) {
+  stop();
+  replays ??= await inflated(page.replays);
+  const run = replays.runs[trial], law = (id) => page.trial.get(id).law, row = page.trial.get(trial);
+  $("run").hidden = false;
+  $("run-title").textContent = `${row.law} on ${row.scenario}, seed ${row.seed}`;
+  $("run-commands").textContent = `dikbench replay ${trial}\ndikbench run --formulation '${row.formulation}'${
+    row.solver === "none" ? "" : ` --solver '${row.solver}'`} --scenario '${row.scenario}' --seed ${row.seed} --plant '${
+    row.plant}' --reference ${row.reference === "rest" ? "time" : row.reference}`;
+  $("run-missing").hidden = Boolean(run);
+  $("run-shown").hidden = !run;
+  $("run-title").focus();
+  if (!run) return;
+  const same = (id) => ["scenario", "seed", "plant", "reference"].every((key) => page.trial.get(id)[key] === row[key]);
+  const others = Object.keys(replays.runs).filter((id) => id !== trial && same(id));
+  $("beside").replaceChildren(new Option("nothing", ""), ...others.map((id) => new Option(law(id), id)));
+  $("beside").value = beside;
+  $("beside").onchange = () => choose($("beside").value);
+  const both = [trial, beside].filter((id) => replays.runs[id]), made = replays.cases[run.case];
+  $("run-certificate").textContent = made.certificate.join("\n");
+  const scenes = await Promise.all(both.map((id, k) => staged($("replays").children[k], replays, id, law(id))));
+  $("replays").children[1].hidden = both.length < 2;
+  const runs = both.map((id) => replays.runs[id]);
+  const end = Math.max(...runs.map((each) => each.dt * each.step.at(-1)));
+  const traces = structuredClone(page.traces);
+  traces.data.find((each) => each.name === "series").values = runs.flatMap((each, k) => each.step.map((step, at) => ({
+    who: law(both[k]), t: step * each.dt, error: each.error[at], speed: each.speed[at], margin: each.margin[at] })));
+  const { view } = await vegaEmbed("#traces", traces, { mode: "vega", renderer: "svg", actions: false });
+  const show = (t) => {
+    $("clock").textContent = `${t.toFixed(2)} s`;
+    $("instant").value = end ? t / end : 0;
+    scenes.forEach((scene) => scene(t));
+    view.signal("cursor", t).runAsync();
   };
-  fill(12);
-  $("more-trials").onclick = () => fill(Infinity);
-  $("trials-title").textContent =
-    `${law}${situation ? `, ${situation}` : ""}: ${chosen.length} trials, the worst first (\u25B6 plays here)`;
-  $("trials").hidden = false;
-  $("trials-title").focus();
+  $("instant").oninput = ({ target }) => show(target.value * end);
+  let playing = 0;
+  stop = () => { cancelAnimationFrame(playing); playing = 0; $("go").textContent = "Play"; };
+  $("go").onclick = () => {
+    if (playing) return stop();
+    let last = performance.now(), t = $("instant").value < 1 ? $("instant").value * end : 0;
+    const go = (now) => {
+      t += (now - last) / 1000 * $("pace").value;
+      last = now;
+      show(Math.min(t, end));
+      if (t < end) playing = requestAnimationFrame(go); else stop();
+    };
+    $("go").textContent = "Pause";
+    playing = requestAnimationFrame(go);
+  };
+  show(run.dt * run.step[run.error.indexOf(Math.max(...run.error))]);
 }
+
+// Put a run on a stage: returns what moves it to a time.
+async function staged(figure, { runs, cases, robots, client }, id, law) {
+  const run = runs[id], made = cases[run.case], robot = robots[made.robot];
+  figure.firstElementChild.textContent = law;
+  if (!robot) return () => {};
+  const frame = openScene(figure.lastElementChild, client, robot.data, matchMedia("(prefers-color-scheme: dark)").matches);
+  for (let k = 0; !isSceneReady(frame); k++) if (k < 200) await later(50); else return () => {};
+  send(frame, made.messages);
+  drawLine(frame, "/path", made.path, page.path_colour);
+  const whole = (columns) => columns.map((column) => { let sum = 0; return column.map((each) => (sum += each) / 1e4); });
+  const joints = whole(run.joints), target = whole(run.target);
+  return (t) => {
+    const k = Math.max(0, run.step.findLastIndex((step) => step * run.dt <= t + 1e-9)), next = Math.min(k + 1, run.step.length - 1);
+    const share = next > k ? Math.min(1, Math.max(0, t / run.dt - run.step[k]) / (run.step[next] - run.step[k])) : 0;
+    const at = (columns) => columns.map((column) => column[k] + share * (column[next] - column[k]));
+    moveRobot(frame, robot.joints, at(joints), [...run.near[k]].map((digit) => page.colours[digit]));
+    moveNode(frame, "/target", at(target));
+  };
+}
+
+if (page) play().catch((error) => { $("play").hidden = false; $("leading").textContent = `The charts cannot be shown: ${error}`; });
