@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -19,7 +20,7 @@ from dikbench.robots.collision.obstacles import (
 from dikbench.robots.robot import Robot
 from dikbench.scenario.scenario import Scenario
 from dikbench.viewer.legend import GREY, OBSTACLE_COLOUR, PAYLOAD_COLOUR, TARGET_COLOUR, Rgb
-from dikbench.viewer.moving_joints import ROBOT_NODE, body_node, joint_nodes, moving_joints, wxyz
+from dikbench.viewer.moving_joints import ROBOT_NODE, body_node, joint_nodes, wxyz
 from dikbench.viewer.simplified_meshes import simplified_meshes
 from dikbench.viewer.tube import tube
 
@@ -191,18 +192,20 @@ def obstacle_points(scenario: Scenario) -> Array:
 
 
 def robot_points(robot: Robot, q: Array) -> Array:
-    """Return points (k, 3) [m] of a robot at configurations (n, nq): its joints, its task frame.
-
-    And its base, where that stands at the world's origin.
-    """
-    model, data = robot.model, robot.model.createData()
-    stands = moving_joints(robot)[0].kind != "free"
-    found = [np.zeros(3)] if stands else []
+    """Return points (k, 3) [m] at the edges of a robot at configurations (n, nq), all links'."""
+    model, data, found = robot.model, robot.model.createData(), []
+    corners = {
+        joint: np.array(list(product(*zip(*_ends(mesh.vertices), strict=True))))
+        for joint, mesh in simplified_meshes(robot).items()
+    }
     for configuration in q:
         pin.forwardKinematics(model, data, configuration)
-        found += [X.translation.copy() for X in data.oMi[1:]]
-        found.append(pin.updateFramePlacement(model, data, robot.frame_id).translation.copy())
-    return np.array(found)
+        tip = pin.updateFramePlacement(model, data, robot.frame_id).translation
+        found.append(tip.copy()[None])
+        for joint, points in corners.items():
+            X = data.oMi[joint]
+            found.append(points @ X.rotation.T + X.translation)
+    return np.vstack(found)
 
 
 def side_of(robot: Robot, points: Array) -> Array:
@@ -223,8 +226,12 @@ def camera_of(points: Array, side: Array) -> Camera:
     """Place a camera on one side (3,) of points (k, 3) [m] such that it sees them all."""
     middle = (points.max(axis=0) + points.min(axis=0)) / 2
     radius = max(float(np.linalg.norm(points - middle, axis=1).max()), SMALLEST_RADIUS_M)
-    position = middle + 1.1 * radius / np.sin(FIELD_OF_VIEW_RAD / 2) * side
+    position = middle + radius / np.sin(FIELD_OF_VIEW_RAD / 2) * side
     return Camera(tuple(np.round(position, 4).tolist()), tuple(np.round(middle, 4).tolist()))
+
+
+def _ends(points: Array) -> tuple[Array, Array]:
+    return points.min(axis=0), points.max(axis=0)
 
 
 def _size(robot: Robot) -> float:

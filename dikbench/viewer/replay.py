@@ -31,6 +31,9 @@ SWATCH_HTML: Final = (
     '<p style="margin:.3em 0"><span style="background:rgb{};border-radius:2px">&emsp;</span> {}</p>'
 )
 
+REST_S: Final = 1.0
+"""Time at the end before a replay begins anew."""
+
 SPEEDS: Final = ("0.05", "0.1", "0.25", "0.5", "1", "2", "4")
 """Speeds to choose from, over the one that was asked for."""
 
@@ -47,6 +50,7 @@ def write_replay(recordings: list[Recording], speed: float, file: Path) -> None:
         for frame, seconds in enumerate(np.diff(scene.times) / speed, start=1):
             recorded.insert_sleep(float(seconds))
             scene.show(frame)
+        recorded.insert_sleep(REST_S)
         page = recorded.as_html()
     title = html.escape(" and ".join(recording.id for recording in recordings))
     page = page.replace("<title>Viser</title>", f"<title>{title}</title>", 1)
