@@ -15,6 +15,8 @@ from dikbench.errors import DikbenchError
 MOST_FORMULATIONS = 2
 """One is compared with all others, two with one another."""
 
+MOST_REPLAYED = 2
+
 
 @click.command()
 @click.argument("a", metavar="A", type=click.Path(path_type=Path, file_okay=False))
@@ -168,7 +170,7 @@ def table(
 
 
 @click.command()
-@click.argument("trial")
+@click.argument("trials", metavar="TRIAL [TRIAL]", nargs=-1, required=True)
 @click.option(
     "--results",
     type=click.Path(path_type=Path, file_okay=False),
@@ -189,19 +191,22 @@ def table(
     help="Write the replay to one HTML file instead of serving it.",
 )
 @one_line_errors
-def replay(trial: str, results: Path | None, speed: float, html: Path | None) -> None:
-    """Show a trial in the browser: the robot, its target, its path and its limits.
+def replay(trials: tuple[str, ...], results: Path | None, speed: float, html: Path | None) -> None:
+    """Show a trial in the browser, or two side by side: robot, target, path, limits, obstacles.
 
     TRIAL is the trial's id in trials.csv, the beginning of it, or the file of its trace.
     """
-    from dikbench.viewer.legend import LEGEND, captions
-    from dikbench.viewer.meshcat_replay import serve_replay, write_replay
+    if len(trials) > MOST_REPLAYED:
+        raise DikbenchError(f"replay takes one trial, or two side by side; got {len(trials)}")
+    from dikbench.viewer.legend import captions, legend
     from dikbench.viewer.recording import find_recording
+    from dikbench.viewer.replay import serve_replay, write_replay
 
-    recording = find_recording(trial, results)
-    click.echo("\n".join([*captions(recording, speed), *(text for _, text in LEGEND)]))
+    recordings = [find_recording(trial, results) for trial in trials]
+    told = [line for recording in recordings for line in captions(recording, speed)]
+    click.echo("\n".join([*told, *(text for _, text in legend(recordings))]))
     if html is None:
-        serve_replay(recording, speed)
+        serve_replay(recordings, speed)
     else:
-        write_replay(recording, speed, html)
+        write_replay(recordings, speed, html)
         click.echo(html)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from dikbench.problem.constraints import CollisionConstraint
 from dikbench.simulation.status import Status
 from dikbench.study.trial import NO_SOLVER
 from dikbench.viewer.limit_use import NEAR_SHARE, Nearness
@@ -21,29 +22,54 @@ COLOURS: Final[dict[Nearness, Rgb]] = {
 }
 """Colours of links; they differ in brightness, too."""
 
-TARGET_COLOUR: Final[Rgb] = (0x00, 0x72, 0xB2)
+PATH_COLOURS: Final[dict[Nearness, Rgb]] = {**COLOURS, Nearness.INSIDE: (40, 40, 40)}
+"""Colours of the path of the task frame, over that of the target."""
+
+TARGET_COLOUR: Final[Rgb] = (0x56, 0xB4, 0xE9)
 """Colour of the path of the target."""
 
 OBSTACLE_COLOUR: Final[Rgb] = (0x8F, 0x7F, 0xB5)
 
 PAYLOAD_COLOUR: Final[Rgb] = (0x00, 0x9E, 0x73)
 
-LEGEND: Final = (
-    (TARGET_COLOUR, "blue: path of the target, with the large axes (x red, y green, z blue)"),
-    (COLOURS[Nearness.INSIDE], "grey: links and path of the task frame, inside all limits"),
-    (COLOURS[Nearness.NEAR], f"yellow: from {100 * NEAR_SHARE:.0f} % of a limit"),
-    (COLOURS[Nearness.PAST], "orange: past a limit"),
-)
-"""Colours and their meaning."""
+
+def legend(recordings: list[Recording]) -> list[tuple[Rgb, str]]:
+    """List the colours in the scene of some recordings, and their meaning."""
+    constraints = [c for each in recordings for c in each.scenario.constraints]
+    kept = [c for c in constraints if isinstance(c, CollisionConstraint)]
+    lines = [
+        (TARGET_COLOUR, "blue: path of the target, with the large axes (x red, y green, z blue)"),
+        (PATH_COLOURS[Nearness.INSIDE], "black: path of the task frame, inside all limits"),
+        (
+            COLOURS[Nearness.NEAR],
+            f"yellow: links and path from {100 * NEAR_SHARE:.0f} % of a limit of position, speed, "
+            "torque or distance",
+        ),
+        (COLOURS[Nearness.PAST], "orange: links and path past a limit"),
+    ]
+    if kept:
+        lines[1:2] = [
+            (PATH_COLOURS[Nearness.INSIDE], f"{lines[1][1]}; line between the nearest bodies")
+        ]
+    if any(constraint.obstacles for constraint in kept):
+        lines.append((OBSTACLE_COLOUR, "violet: obstacles"))
+    if any(each.scenario.robot.payload_radius for each in recordings):
+        lines.append((PAYLOAD_COLOUR, "green: what is carried"))
+    return lines
+
+
+def name_of(recording: Recording) -> str:
+    """Name formulation and solver of a recording."""
+    trial = recording.trial
+    return f"{trial.formulation}" + ("" if trial.solver == NO_SOLVER else f" with {trial.solver}")
 
 
 def captions(recording: Recording, speed: float) -> list[str]:
     """Say what is replayed, in lines."""
     trial, trace = recording.trial, recording.trace
-    solver = "" if trial.solver == NO_SOLVER else f" with {trial.solver}"
     ended = "" if recording.status == Status.OK.value else f", ended {recording.status}"
     lines = [
-        f"{trial.formulation}{solver} on {trial.scenario}",
+        f"{name_of(recording)} on {trial.scenario}",
         f"{trial.plant} plant, reference by {trial.reference}, seed {trial.seed}, "
         f"{trace.steps * trace.dt:.4g} s{ended}, replayed at {speed:g} times the speed",
     ]

@@ -44,10 +44,20 @@ class MovingJoint:
     wxyz: tuple[float, ...]
     position: tuple[float, ...]
 
-    @property
-    def body(self) -> str:
-        """Name of the node of what the joint carries, a mesh; there may be none."""
-        return body_node(self.node)
+    def pose(self, row: Array) -> tuple[Array, Array]:
+        """Compute position (3,) [m] and orientation w, x, y, z in the parent node.
+
+        Args:
+            row: coordinates of all joints, (columns,).
+        """
+        position, turn, c = np.array(self.position), np.array(self.wxyz), row[self.column]
+        if self.kind == "free":
+            return row[self.column : self.column + 3], row[self.column + 3 : self.column + 7]
+        if self.kind == "slide":
+            return position + c * np.array(self.axis), turn
+        w, *xyz = self.wxyz
+        turned = pin.Quaternion(pin.AngleAxis(c, np.array(self.axis))) * pin.Quaternion(w, *xyz)
+        return position, turned.coeffs()[[3, 0, 1, 2]]
 
 
 def body_node(node: str) -> str:

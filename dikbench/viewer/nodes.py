@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+import pinocchio as pin
 
 from dikbench.arrays import Array
 from dikbench.problem.constraints import CollisionConstraint
@@ -16,11 +18,11 @@ from dikbench.robots.collision.obstacles import (
     SphereObstacle,
 )
 from dikbench.robots.robot import Robot
-from dikbench.robots.stick_figure import stick
 from dikbench.scenario.scenario import Scenario
-from dikbench.viewer.legend import GREY, OBSTACLE_COLOUR, PAYLOAD_COLOUR, Rgb
+from dikbench.viewer.legend import GREY, OBSTACLE_COLOUR, PAYLOAD_COLOUR, TARGET_COLOUR, Rgb
 from dikbench.viewer.moving_joints import ROBOT_NODE, body_node, joint_nodes, wxyz
 from dikbench.viewer.simplified_meshes import simplified_meshes
+from dikbench.viewer.tube import tube
 
 if TYPE_CHECKING:
     import viser
@@ -34,12 +36,21 @@ PATH_NODE: Final = "/path"
 OBSTACLES_NODE: Final = "/obstacles"
 """Node of the obstacles, which are below it by their number."""
 
+TUBE_RADIUS_SHARE: Final = 0.007
+"""Radius of the path of the target, as a share of the robot's size."""
+
 PATH_POINTS: Final = 200
 
 CAMERA_YAW_RAD: Final = np.deg2rad(50)
 """Angle about the vertical from the direction of the path to that of the camera."""
 
 FIELD_OF_VIEW_RAD: Final = 0.75
+
+SMALLEST_RADIUS_M: Final = 0.25
+"""Radius about the middle that a camera sees at least."""
+
+FARTHEST_EDGE_M: Final = 0.4
+"""How much of an obstacle is taken into view, from its middle."""
 
 
 @dataclass(frozen=True)
@@ -100,10 +111,26 @@ def add_robot(scene: viser.SceneApi, robot: Robot, robot_node: str = ROBOT_NODE)
     return names
 
 
-def add_target(scene: viser.SceneApi, robot: Robot, node: str = TARGET_NODE) -> None:
+def add_target(scene: viser.SceneApi, robot: Robot, node: str = TARGET_NODE) -> viser.FrameHandle:
     """Add the frame of the target, in the world's place."""
     size = _size(robot)
-    scene.add_frame(node, axes_length=0.14 * size, axes_radius=0.004 * size)
+    return scene.add_frame(node, axes_length=0.14 * size, axes_radius=0.004 * size)
+
+
+def add_path(scene: viser.SceneApi, scenario: Scenario, node: str = PATH_NODE) -> None:
+    """Add the path of the target as a tube, through which the task frame's own is seen."""
+    made = tube(path_points(scenario), TUBE_RADIUS_SHARE * _size(scenario.robot))
+    if made is not None:
+        scene.add_mesh_simple(
+            node,
+            made.vertices.astype(np.float32),
+            made.faces.astype(np.uint32),
+            color=TARGET_COLOUR,
+            opacity=0.4,
+            side="double",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
 
 
 def add_payload(scene: viser.SceneApi, robot: Robot, robot_node: str = ROBOT_NODE) -> None:
@@ -153,27 +180,64 @@ def path_points(scenario: Scenario) -> Array:
     return reference.placements(np.linspace(0.0, reference.duration, count))[1]
 
 
-def camera_of(robot: Robot, points: Array) -> Camera:
-    """Choose a camera that sees points (k, 3) [m] of a robot and its way, from the path's side."""
-    middle = (points.max(axis=0) + points.min(axis=0)) / 2
-    size = max(float(np.linalg.norm(np.ptp(points, axis=0))), 0.3)
-    x, y, _ = points[-1]
-    towards = np.arctan2(y, x) - CAMERA_YAW_RAD
-    side = np.array([np.cos(towards), np.sin(towards), 0.55])
-    if 2 not in robot.movable_rows:  # a planar arm is seen from above
-        side = np.array([0.0, -0.01, 1.15])
-    position = middle + 1.35 * size * side
-    return Camera(tuple(np.round(position, 4).tolist()), tuple(np.round(middle, 4).tolist()))
+def obstacle_points(scenario: Scenario) -> Array:
+    """Return points (k, 3) [m] at the edge of the obstacles of a scenario."""
+    found = [np.empty((0, 3))]
+    for obstacle in obstacles_of(scenario):
+        shape, placement = obstacle.geometry()
+        shape.computeLocalAABB()
+        away = min(float(shape.aabb_radius), FARTHEST_EDGE_M)
+        found.append(placement.translation + away * np.vstack([np.eye(3), -np.eye(3)]))
+    return np.vstack(found)
 
 
 def robot_points(robot: Robot, q: Array) -> Array:
-    """Return points (k, 3) [m] of a robot at configurations (n, nq): its base and its joints."""
-    return np.vstack([np.zeros((1, 3)), *(stick(robot, each) for each in q)])
+    """Return points (k, 3) [m] at the edges of a robot at configurations (n, nq), all links'."""
+    model, data, found = robot.model, robot.model.createData(), []
+    corners = {
+        joint: np.array(list(product(*zip(*_ends(mesh.vertices), strict=True))))
+        for joint, mesh in simplified_meshes(robot).items()
+    }
+    for configuration in q:
+        pin.forwardKinematics(model, data, configuration)
+        tip = pin.updateFramePlacement(model, data, robot.frame_id).translation
+        found.append(tip.copy()[None])
+        for joint, points in corners.items():
+            X = data.oMi[joint]
+            found.append(points @ X.rotation.T + X.translation)
+    return np.vstack(found)
+
+
+def side_of(robot: Robot, points: Array) -> Array:
+    """Choose the direction (3,) from which to see the way of a robot through points (k, 3) [m].
+
+    A planar arm is seen from above, others from beside the way to its points, somewhat above.
+    """
+    if 2 not in robot.movable_rows:
+        return np.array([0.0, -0.01, 1.0])
+    x, y, _ = points.mean(axis=0)
+    towards = np.arctan2(y, x) - CAMERA_YAW_RAD
+    side = np.array([np.cos(towards), np.sin(towards), 0.45])
+    unit: Array = side / np.linalg.norm(side)
+    return unit
+
+
+def camera_of(points: Array, side: Array) -> Camera:
+    """Place a camera on one side (3,) of points (k, 3) [m] such that it sees them all."""
+    middle = (points.max(axis=0) + points.min(axis=0)) / 2
+    radius = max(float(np.linalg.norm(points - middle, axis=1).max()), SMALLEST_RADIUS_M)
+    position = middle + radius / np.sin(FIELD_OF_VIEW_RAD / 2) * side
+    return Camera(tuple(np.round(position, 4).tolist()), tuple(np.round(middle, 4).tolist()))
+
+
+def _ends(points: Array) -> tuple[Array, Array]:
+    return points.min(axis=0), points.max(axis=0)
 
 
 def _size(robot: Robot) -> float:
     """Estimate how large a robot is [m]."""
-    return max(float(np.linalg.norm(np.ptp(robot_points(robot, robot.q0[None]), axis=0))), 0.5)
+    points = robot_points(robot, robot.q0[None])
+    return max(float(np.linalg.norm(np.ptp(points, axis=0))), 2 * SMALLEST_RADIUS_M)
 
 
 def _add_ball(scene: viser.SceneApi, node: str, at: Array, radius: float, colour: Rgb) -> None:

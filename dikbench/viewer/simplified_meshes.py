@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
 import coal
@@ -12,7 +14,7 @@ from scipy.spatial import ConvexHull
 
 from dikbench.arrays import Array, Indices
 from dikbench.robots.robot import Robot
-from dikbench.viewer.visuals import bodies
+from dikbench.viewer.capsules import capsules
 
 CORNERS: Final = 1100
 """Corners of all hulls of a robot; a hull has about twice as many triangles."""
@@ -22,6 +24,9 @@ FEWEST_CORNERS, MOST_CORNERS = 28, 140
 
 SMALLEST_PART_SHARE: Final = 0.2
 """Parts of a mesh that are smaller are left out, as a share of its size: screws, caps."""
+
+BEYOND_SHARE: Final = 0.01
+"""But not where they reach farther than larger ones, by this share of its size."""
 
 MOST_PARTS: Final = 6
 """A mesh of more parts is taken as one: its triangles do not meet."""
@@ -54,8 +59,8 @@ class Mesh(NamedTuple):
 NO_MESH: Final = Mesh(np.empty((0, 3)), np.empty((0, 3), dtype=np.intp))
 
 
-def simplified_meshes(robot: Robot) -> dict[int, Mesh]:
-    """Simplify the visual geometry of a robot (see `bodies`): a mesh per joint that carries any.
+def simplified_meshes(robot: Robot) -> Mapping[int, Mesh]:
+    """Simplify the visual geometry of a robot, else its capsules: a mesh per joint with any.
 
     Each connected part of a mesh becomes the convex hull of its extreme points, so that holes and
     hollows are filled, and what has many triangles has about 2000 in all.
@@ -63,16 +68,30 @@ def simplified_meshes(robot: Robot) -> dict[int, Mesh]:
     Returns:
         The meshes by Pinocchio's index of the joint, 0 for the base.
     """
-    parts = [
-        (body.parentJoint, body.placement.rotation @ part.T, body.placement.translation)
-        for body in bodies(robot).geometryObjects
+    found = None if robot.visuals is None else _of_visuals(robot.visuals)
+    return _simplified(capsules(robot)) if found is None else found
+
+
+@lru_cache(maxsize=16)
+def _of_visuals(visuals: Callable[[], Any]) -> Mapping[int, Mesh] | None:
+    """Simplify the geometry of all robots that have it; None for a URDF without its meshes."""
+    try:
+        geometry = visuals()
+    except ValueError:
+        return None
+    return _simplified(geometry)
+
+
+def _simplified(geometry: Any) -> Mapping[int, Mesh]:
+    clouds = [
+        (body.parentJoint, part @ body.placement.rotation.T + body.placement.translation)
+        for body in geometry.geometryObjects
         for part in _parts(body.geometry)
     ]
-    clouds = [(joint, turned.T + origin) for joint, turned, origin in parts]
-    sizes = [_size(cloud) for _, cloud in clouds]
+    total = sum(_size(cloud) for _, cloud in clouds)
     found: dict[int, Mesh] = {}
-    for (joint, cloud), size in zip(clouds, sizes, strict=True):
-        corners = round(CORNERS * size / sum(sizes))
+    for joint, cloud in clouds:
+        corners = round(CORNERS * _size(cloud) / total)
         added = hull(cloud, min(max(corners, FEWEST_CORNERS), MOST_CORNERS))
         before = found.get(joint, NO_MESH)
         found[joint] = Mesh(
@@ -115,15 +134,28 @@ def _parts(shape: Any) -> list[Array]:
         return [vertices]
     found = map(shape.tri_indices, range(shape.num_tris))
     triangles = np.array([[triangle[k] for k in range(3)] for triangle in found])
+    used, triangles = np.unique(triangles, return_inverse=True)
+    vertices, triangles = vertices[used], triangles.reshape(-1, 3)  # some files have stray points
     seams, merged = np.unique(np.round(vertices / SEAM_M), axis=0, return_inverse=True)
     a, b, c = merged.ravel()[triangles].T
     edges = np.concatenate([a, b]), np.concatenate([b, c])
     graph = coo_array((np.ones(len(edges[0])), edges), shape=(len(seams), len(seams)))
     count, of = connected_components(graph, directed=False)
     parts = [vertices[of[merged.ravel()] == number] for number in range(count)]
-    smallest = SMALLEST_PART_SHARE * _size(vertices)
-    large = [part for part in parts if _size(part) >= smallest]
-    return large if 0 < len(large) <= MOST_PARTS else [vertices]
+    kept = _telling(sorted(parts, key=_size, reverse=True), _size(vertices))
+    return kept if len(kept) <= MOST_PARTS else [vertices]
+
+
+def _telling(parts: list[Array], size: float) -> list[Array]:
+    """Choose the parts (k, 3) of a mesh that are large, or reach beyond larger ones."""
+    kept, low, high = list[Array](), np.full(3, np.inf), np.full(3, -np.inf)
+    for part in parts:
+        ends = part.min(axis=0), part.max(axis=0)
+        beyond = max((low - ends[0]).max(), (ends[1] - high).max())
+        if _size(part) >= SMALLEST_PART_SHARE * size or beyond > BEYOND_SHARE * size:
+            kept.append(part)
+            low, high = np.minimum(low, ends[0]), np.maximum(high, ends[1])
+    return kept
 
 
 def _primitive(shape: Any) -> Array:

@@ -30,8 +30,10 @@ from dikbench.viewer.nodes import (
     add_robot,
     add_target,
     camera_of,
+    obstacle_points,
     path_points,
     robot_points,
+    side_of,
 )
 from dikbench.viewer.viser_client import messages_of, viser_server
 
@@ -61,7 +63,8 @@ def static_scene(robot: Robot) -> StaticScene:
     with viser_server() as server:
         bodies = add_robot(server.scene, robot)
         add_target(server.scene, robot)
-        camera_of(robot, robot_points(robot, robot.q0[None])).place(server)
+        points = robot_points(robot, robot.q0[None])
+        camera_of(points, side_of(robot, points)).place(server)
         data = base64.b64encode(server.get_scene_serializer().serialize()).decode()
     joints = [
         {**asdict(joint), "body": body}
@@ -95,7 +98,8 @@ def surroundings(scenario: Scenario) -> Surroundings:
         before = len(messages_of(server))
         add_obstacles(server.scene, scenario)
         add_payload(server.scene, robot)
-        camera_of(robot, np.vstack([robot_points(robot, scenario.q0[None]), path])).place(server)
+        points = [robot_points(robot, scenario.q0[None]), path, obstacle_points(scenario)]
+        camera_of(np.vstack(points), side_of(robot, path)).place(server)
         messages = messages_of(server)[before:]
     return Surroundings(messages, np.round(path, 4).tolist())
 

@@ -88,6 +88,12 @@ class CollisionPairs:
         pin.computeDistances(self._geometry, self._placed)
         return np.array([result.min_distance for result in self._results])
 
+    def nearest(self) -> tuple[float, Array]:
+        """Return the smallest distance [m] at the last `distances`, and the two points, (2, 3)."""
+        result = min(self._results, key=lambda found: float(found.min_distance))
+        points = np.array([result.getNearestPoint1(), result.getNearestPoint2()])
+        return float(result.min_distance), points
+
     def gradients(self, kinematics: Kinematics, pairs: Indices) -> Array:
         """Compute dphi/dq of some pairs, (k, nv) [m/rad or 1], at the last `distances`.
 
