@@ -12,7 +12,6 @@ from dikbench.report.interactive.controls import Control, filter_of
 from dikbench.report.interactive.page_rows import TOLERANCES_M
 from dikbench.report.selection.categories import CATEGORIES
 from dikbench.statistics.first_places import FEWEST_SCENARIOS
-from dikbench.statistics.success import MOST_BEHIND
 
 ROWS: Final = "rows"
 """The data set that the page fills."""
@@ -73,9 +72,9 @@ def ranked(controls: Sequence[Control]) -> alt.Chart:
     """Rank the laws by success, each compared with the best or with the law of `versus`.
 
     A row per law: rate, trials, whole (whether it ran every case), difference, lower, upper (the
-    paired interval: of independent scenarios), tied (first, by the rule of
-    `statistics.success.rates`), standing (its place in words). Who did not run every case is not
-    ranked, nor anybody where fewer than `FEWEST_SCENARIOS` scenarios count.
+    paired interval: of independent scenarios), tied (not told apart from whom it is compared with),
+    place. Who did not run every case has no place, nor has anybody where fewer than
+    `FEWEST_SCENARIOS` scenarios count.
     """
     return (
         weighted(counted_rows(controls))
@@ -92,8 +91,10 @@ def ranked(controls: Sequence[Control]) -> alt.Chart:
             sort=[alt.SortField("against", "descending"), alt.SortField("law")],
             groupby=["scenario"], frame=[None, None],
         )
+        .transform_calculate(w="versus=='best'||datum.rival==versus?datum.w:0")
         .transform_calculate(d="datum.s-datum.base", wd="datum.w*(datum.s-datum.base)")
-        .transform_joinaggregate(difference="sum(wd)", groupby=["law"])
+        .transform_joinaggregate(sum_wd="sum(wd)", sum_w="sum(w)", groupby=["law"])
+        .transform_calculate(w="datum.w/datum.sum_w", difference="datum.sum_wd/datum.sum_w")
         .transform_calculate(v="pow(datum.w*(datum.d-datum.difference),2)")
         .transform_aggregate(
             rate="max(rate)", trials="max(trials)", whole="max(whole)", count="max(count)",
@@ -108,26 +109,17 @@ def ranked(controls: Sequence[Control]) -> alt.Chart:
             enough=f"datum.count>={FEWEST_SCENARIOS}?1:0",
             rounded="datum.whole*1e7+round(1e6*datum.rate)",
         )
+        .transform_calculate(
+            tied="datum.whole==1&&datum.enough==1&&datum.rate>0"
+            "&&datum.lower<=0&&datum.upper>=0?1:0"
+        )
+        .transform_joinaggregate(laws="count()")
         .transform_window(
-            best="max(rate)", sort=[alt.SortField("whole", "descending")], frame=[None, None],
-            groupby=["whole"],
+            rank="rank()", dense="dense_rank()", sort=[alt.SortField("rounded", "descending")]
         )
         .transform_calculate(
-            apart="datum.whole==1&&versus=='best'&&datum.difference+datum.half<0?datum.rate:0"
-        )
-        .transform_joinaggregate(apart="max(apart)")
-        .transform_calculate(
-            tied="datum.whole==1&&datum.enough==1&&datum.rate>0&&datum.rate>=datum.apart"
-            f"&&datum.rate>=datum.best-{MOST_BEHIND}"
-            "&&(versus=='best'||datum.rate==datum.best)?1:0"
-        )
-        .transform_joinaggregate(ties="sum(tied)", laws="count()")
-        .transform_window(
-            place="rank()", dense="dense_rank()", sort=[alt.SortField("rounded", "descending")]
-        )
-        .transform_calculate(
-            standing="datum.whole==0||datum.enough==0?'not ranked':datum.tied==1&&datum.ties>1"
-            "?'1 to '+datum.ties:''+datum.place"
+            place="datum.whole==0||datum.enough==0||datum.rate==0?null:datum.rank",
+            apart="datum.whole==0||datum.enough==0?'':datum.tied==1?'no':'yes'",
         )
         .transform_filter("datum.dense<=toNumber(most)||datum.law==versus")
     )  # fmt: skip

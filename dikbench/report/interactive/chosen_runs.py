@@ -18,9 +18,9 @@ LONGEST_S: Final = 0.4
 CASE: Final = ["scenario", "seed", "plant", "reference"]
 
 RULE: Final = (
-    "Carried are, on the first plant and with the first solver of each formulation, its worst and "
-    "its median run in every situation, and the same cases under the other formulations, those of "
-    "the most cases first, as far as there is room."
+    "The page carries, on the first plant and with the first solver of each formulation, its "
+    "worst run in every situation and, where the path may wait, its median one; then the same "
+    "cases under the other formulations, as far as there is room."
 )
 
 
@@ -38,15 +38,17 @@ def chosen_runs(rows: pd.DataFrame, seconds: pd.Series) -> list[str]:
         ["category", "farthest"], kind="stable", na_position="last"
     )
     marked = set[str]()
-    for _, runs in order.groupby(["law", "situation"], sort=False):
+    for (_, _, reference), runs in order.groupby(["law", "situation", "reference"], sort=False):
         ids = runs["id"].tolist()
-        marked |= {ids[-1], ids[(len(ids) - 1) // 2]}
+        marked |= {ids[-1]} if reference == "time" else {ids[-1], ids[(len(ids) - 1) // 2]}
     carries = order["id"].isin(marked)
     weight = carries.groupby([order[name] for name in CASE]).transform("sum")
     spent = order["id"].map(seconds).fillna(0.0)
     wanted = order.assign(marked=carries, weight=weight, seconds=spent)
     wanted = wanted[wanted["weight"].gt(0) & spent.le(LONGEST_S)].sort_values(
-        ["marked", "weight", *CASE], ascending=[False, False, True, True, True, True], kind="stable"
+        ["marked", "weight", "reference", *CASE[:3]],
+        ascending=[False, False, True, True, True, True],
+        kind="stable",
     )
     taken = wanted.head(MOST_RUNS)
     return list(taken.loc[taken["seconds"].cumsum().le(MOST_SECONDS), "id"])

@@ -43,10 +43,11 @@ def page_rows(trials: pd.DataFrame) -> pd.DataFrame:
     """Make the rows of the page: a trial that counts in a setting each (see `counted`).
 
     Its columns are id, law (the formulation, with its solver where it has several), formulation,
-    solver, interface, first (1 for the first solver of a formulation), variant and is_tuned (see `variant`), scenario, seed, family, situation, plant, reference (`AT_REST` where the target rests), robot,
-    outcomes (see `_outcomes`), the numbers of `SHOWN`, deadline (the largest 99th percentile of
-    the formulation's time in a timed scenario [us]), grid, across, up (its place in a phase
-    diagram), swept, value (the parameter of the formulation that is swept).
+    solver, interface, first (1 for the first solver of a formulation), variant and is_tuned (see
+    `variant`), scenario, seed, family, situation, plant, reference (`AT_REST` where the target
+    rests), robot, outcomes (see `_outcomes`), the numbers of `SHOWN`, deadline (the largest 99th
+    percentile of the formulation's time in a timed scenario [us]), grid, across, up (its place in
+    a phase diagram), swept, value (the parameter of the formulation that is swept).
     """
     facts = with_facts(trials)
     facts = facts[~facts["formulation"].isin(ORACLES)]

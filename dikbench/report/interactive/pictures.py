@@ -12,8 +12,8 @@ from dikbench.report.interactive.charts import BAD, CHOSEN, GOOD, OTHER, counted
 from dikbench.report.interactive.controls import Control
 from dikbench.report.interactive.page_rows import TOLERANCES_M
 
-WIDTH_PX: Final = 400
-HEIGHT_PX: Final = 250
+WIDTH_PX: Final = 340
+HEIGHT_PX: Final = 240
 
 _CASE: Final = ["scenario", "seed", "plant", "reference"]
 
@@ -50,8 +50,8 @@ def cost(controls: Sequence[Control]) -> alt.Chart:
         )
         .transform_filter(f"datum.rate>={LEAST_RATE}||datum.law==versus")
     )
-    return _scatter(found, "rms distance from the path, median [mm; ratio]",
-                    "slow-down, median [1; ratio]", "What accuracy costs", "cost")  # fmt: skip
+    return _scatter(found, "rms distance from the path, median [mm], or ratio",
+                    "slow-down, median, or ratio", "What accuracy costs", "cost")  # fmt: skip
 
 
 def deadline(controls: Sequence[Control]) -> Any:
@@ -136,10 +136,18 @@ def profile(controls: Sequence[Control]) -> Any:
     )
 
 
-def phase(controls: Sequence[Control]) -> Any:
-    """Draw a phase diagram: success, distance or peak speed over distance and speed."""
+def phase(controls: Sequence[Control], across: str, up: str) -> Any:
+    """Draw a phase diagram: success, distance or peak speed over distance and speed.
+
+    It is of the formulation chosen for it, whatever `variant` and `solver` choose.
+
+    Args:
+        controls: of the rows.
+        across: what the first parameter of the families is called.
+        up: what the second one is called.
+    """
     found = (
-        counted_rows(controls)
+        counted_rows([each for each in controls if each.name not in {"variant", "solver"}])
         .transform_filter("datum.law==phase&&datum.grid==grid")
         .transform_aggregate(
             success="mean(done)", error="median(error)", peak="max(peak)", n="count()",
@@ -152,10 +160,8 @@ def phase(controls: Sequence[Control]) -> Any:
             "?format(datum.error,'.2~g'):format(datum.peak,'.3~g')",
         )
     )  # fmt: skip
-    x = alt.X(
-        "across:O", title="distance from the singularity (m, rad)", axis=alt.Axis(labelAngle=0)
-    )
-    y = alt.Y("up:O", sort="descending", title="speed")
+    x = alt.X("across:O", title=across, axis=alt.Axis(labelAngle=0))
+    y = alt.Y("up:O", sort="descending", title=up)
     tooltip = [
         alt.Tooltip("across:O"), alt.Tooltip("up:O"), alt.Tooltip("success:Q", format=".0%"),
         alt.Tooltip("error:Q", format=".3~g", title="rms distance, median [mm]"),
@@ -169,7 +175,7 @@ def phase(controls: Sequence[Control]) -> Any:
     )  # fmt: skip
     numbers = found.mark_text(color="#000").encode(x, y, text="text:N")
     return alt.layer(cells, numbers).properties(
-        width=WIDTH_PX, height=HEIGHT_PX, title="Phase diagram near a singularity", name="phase"
+        width=WIDTH_PX, height=HEIGHT_PX, title="Phase diagram", name="phase"
     )
 
 

@@ -89,8 +89,7 @@ def _run(again: RunAgain) -> dict[str, Any]:
     """
     trace, scenario = again.run.trace, again.scenario
     steps = np.unique(np.linspace(0, trace.steps, min(INSTANTS, trace.steps + 1)).astype(int))
-    targets = [scenario.reference.placement(float(trace.tau[k])) for k in steps]
-    poses = np.array([[*target.translation, *wxyz(target.rotation)] for target in targets])
+    targets = target_poses(scenario, trace.tau[steps])
     near = joint_nearness(trace, scenario, steps)
     return {
         "dt": trace.dt,

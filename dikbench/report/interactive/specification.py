@@ -47,7 +47,10 @@ def make_charts(rows: pd.DataFrame) -> Charts:
     if rows["deadline"].notna().any():
         pictures.insert(1, deadline(asked))
     if of_phase:
-        pictures.append(phase(asked))
+        grids = [grid.rpartition(": ")[2] for grid in rows["grid"].unique() if grid]
+        named = grids[0] if len(set(grids)) == 1 else "second parameter over first parameter"
+        up, _, across = named.partition(" over ")
+        pictures.append(phase(asked, across, up))
     if rows["swept"].ne("").any():
         pictures.append(sensitivity(asked))
     tables = [

@@ -23,7 +23,7 @@ HEIGHT_PX: Final = 95
 
 
 def trace_charts() -> dict[str, Any]:
-    """Declare the charts over a data set `series` (who, t, and `SERIES`), with a signal `cursor`."""
+    """Declare the charts of a data set `series` (who, t, `SERIES`), with a signal `cursor`."""
     parts = [_lines(name, title, limit) for name, title, limit in SERIES]
     chart = (
         alt.vconcat(*parts, spacing=8)

@@ -125,6 +125,34 @@ def leaders(
     return Leaders(contenders, alone, found, Finding(f"{question} where {IN_WORDS[setting]}", text))
 
 
+def headline(leading: Leaders, setting: Setting, cases: int, names: Names) -> str:
+    """Say in a line who succeeds most in a situation; empty where nobody can be named.
+
+    Args:
+        leading: who is first there, or may be.
+        setting: of the rows.
+        cases: how many count.
+        names: how formulations are called.
+    """
+    if not leading.contenders:
+        return ""
+    rate_of = dict(
+        zip(
+            leading.found.contenders.itertuples(index=False, name=None),
+            map(float, leading.found.rate),
+            strict=True,
+        )
+    )
+    most = max(rate_of[contender] for contender in leading.contenders)
+    best = [each for each in leading.contenders if rate_of[each] >= most - ROUNDING]
+    others = np.array([rate_of[each] for each in leading.contenders if each not in best])
+    said = f"{IN_WORDS[setting]}: {names.of(best)} with {number(100 * most)} % of {cases} cases"
+    if len(others):
+        more = f"{len(others)} {'more' if len(others) > 1 else 'other'}"
+        said += f"; {more} ({_range(others)}) not told apart"
+    return f"{said}."
+
+
 def _with_shares(of: Sequence[tuple[Contender, float]], names: Names) -> str:
     """Name formulations with their rates, best first, those of the same rate together.
 

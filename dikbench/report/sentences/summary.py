@@ -18,6 +18,7 @@ from dikbench.report.sentences.findings import (
     broke_off,
     fastest,
     first_most_often,
+    headline,
     leaders,
     most_accurate,
     unanswered,
@@ -33,6 +34,7 @@ from dikbench.statistics.first_places import (
     held_back,
 )
 from dikbench.statistics.success import MOST_BEHIND, Contender, Setting, with_facts
+from dikbench.statistics.trial_matrix import CASE
 
 
 @dataclass(frozen=True)
@@ -61,12 +63,14 @@ class Summary:
         short: findings over all situations.
         chapters: findings per situation, where there are any.
         scenarios: how many scenarios it speaks of.
+        headlines: for the situations in which somebody can be named, who succeeds most, in a line.
     """
 
     basis: str
     short: tuple[Finding, ...] = ()
     chapters: tuple[Chapter, ...] = ()
     scenarios: int = 0
+    headlines: tuple[str, ...] = ()
 
 
 def summarise(trials: pd.DataFrame) -> Summary:
@@ -88,7 +92,7 @@ def summarise(trials: pd.DataFrame) -> Summary:
     every = rows_of_all(of_setting)
     candidates = {setting: dependable(rows, every) for setting, rows in of_setting.items()}
     barred = {setting: held_back(rows, every) for setting, rows in of_setting.items()}
-    chapters = []
+    chapters, headlines = [], []
     firsts: list[tuple[Setting, tuple[Contender, ...]]] = []
     for situation, definition in DEFINITIONS.items():
         findings: list[Finding] = []
@@ -104,6 +108,9 @@ def summarise(trials: pd.DataFrame) -> Summary:
             if leading.alone:
                 firsts.append((setting, leading.contenders))
             findings.append(leading.finding)
+            line = headline(leading, setting, len(part[list(CASE)].drop_duplicates()), names)
+            if line and not any(each.startswith(situation) for each in headlines):
+                headlines.append(f"{situation}, {line}")
             if setting == "path" and (closest := most_accurate(part, leading, names)):
                 findings.append(closest)
         if findings:
@@ -116,7 +123,9 @@ def summarise(trials: pd.DataFrame) -> Summary:
         unanswered(every[~every["formulation"].isin(ORACLES)], names),
     )
     said = tuple(each for each in short if each)
-    return Summary(_basis(trials), said, tuple(chapters), every["scenario"].nunique())
+    return Summary(
+        _basis(trials), said, tuple(chapters), every["scenario"].nunique(), tuple(headlines)
+    )
 
 
 def _basis(trials: pd.DataFrame) -> str:

@@ -17,7 +17,7 @@ function fill(table, rows) {
     const line = document.createElement("tr");
     cells.forEach((content, place) => {
       const cell = document.createElement(place === 1 ? "th" : "td");
-      if (typeof content !== "number") cell.className = "name";
+      if (!/^[-\d.]*$/.test(content)) cell.className = "name";
       cell.append(content);
       line.append(cell);
     });
@@ -28,14 +28,14 @@ function fill(table, rows) {
 // A heading of a sortable table is a button that sorts its rows: numbers first, what is empty last.
 for (const heading of document.querySelectorAll("table.sortable > thead th")) {
   const sort = button("", () => {
-    const table = heading.closest("table"), falls = heading.getAttribute("aria-sort") === "descending";
+    const table = heading.closest("table"), rises = heading.getAttribute("aria-sort") !== "ascending";
     for (const other of table.tHead.rows[0].cells) other.removeAttribute("aria-sort");
-    heading.setAttribute("aria-sort", falls ? "ascending" : "descending");
+    heading.setAttribute("aria-sort", rises ? "ascending" : "descending");
     const rows = Array.from(table.tBodies[0].rows, (row) => {
       const cell = row.cells[heading.cellIndex], text = (cell.dataset.sort ?? cell.textContent).trim();
       return [row, text === "" ? 2 : Number.isNaN(parseFloat(text)) ? 1 : 0, text];
     });
-    const compare = (a, b) => (a[1] ? a[2].localeCompare(b[2]) : parseFloat(a[2]) - parseFloat(b[2])) * (falls ? 1 : -1);
+    const compare = (a, b) => (a[1] ? a[2].localeCompare(b[2]) : parseFloat(a[2]) - parseFloat(b[2])) * (rises ? 1 : -1);
     rows.sort((a, b) => a[1] - b[1] || (a[1] < 2 ? compare(a, b) : 0));
     table.tBodies[0].append(...rows.map(([row]) => row));
   });
@@ -84,15 +84,17 @@ async function play() {
     await view.runAsync();
     for (const slider of document.querySelectorAll("#controls input"))
       slider.previousElementSibling.value = slider.dataset.texts.split("|")[slider.value];
-    const rows = view.data(page.ranking).toSorted((a, b) => a.place - b.place || a.law.localeCompare(b.law));
-    fill($("ranking"), rows.map((row) => [row.standing, row.law, Number(percent(row.rate)),
-      Number(percent(row.difference)), `${percent(row.lower)} to ${percent(row.upper)}`, row.trials,
+    const rows = view.data(page.ranking).toSorted((a, b) => a.rank - b.rank || a.law.localeCompare(b.law));
+    fill($("ranking"), rows.map((row) => [row.place ?? "", row.law, percent(row.rate),
+      percent(row.difference), `${percent(row.lower)} to ${percent(row.upper)}`, row.apart, row.trials,
       button("show", () => list(row.law, {}))]));
-    const first = rows.filter((row) => row.tied).map((row) => `${row.law} (${percent(row.rate)} %)`);
+    const named = (some) => some.slice(0, 5).map((row) => `${row.law} (${percent(row.rate)} %)`).join(", ")
+      + (some.length > 5 ? ` and ${some.length - 5} more` : "");
+    const best = rows.filter((row) => row.place === 1), near = rows.filter((row) => row.place > 1 && row.tied);
     $("leading").textContent = !rows.length ? "No trial is left: choose less." : !rows[0].enough ? page.fewest
-      : !first.length ? "Nobody succeeds, or nobody ran every trial, in this view."
-      : `In this view ${first.slice(0, 5).join(", ")}${first.length > 5 ? ` and ${first.length - 5} more` : ""} ${
-        first.length > 1 ? "succeed most often and cannot be told apart" : "succeeds most often; the others can be told apart"}.`;
+      : !best.length ? "In this view nobody ran every trial and succeeded." : `In this view ${named(best)} succeed${
+        best.length > 1 ? "" : "s"} most often; ${$("versus").value !== "best" ? `differences are to ${$("versus").value}`
+        : near.length ? `not told apart: ${named(near)}` : "all others are told apart"}.`;
     $("sample").textContent = rows.length ? `${rows[0].laws} formulations, ${Math.max(...rows.map((row) => row.trials))
       } trials each, ${rows[0].count} scenarios` : "";
     const state = asked.filter((name) => $(name).value !== initial[name]).map((name) => [name, $(name).value]);
