@@ -46,7 +46,7 @@ CAMERA_YAW_RAD: Final = np.deg2rad(50)
 
 FIELD_OF_VIEW_RAD: Final = 0.75
 
-WIDTH_OVER_HEIGHT: Final = 1.3
+WIDTH_OVER_HEIGHT: Final = 1.1
 """What a window has at least, less the room of the captions."""
 
 SMALLEST_RADIUS_M: Final = 0.25
