@@ -8,7 +8,7 @@ import numpy as np
 
 from dikbench.arrays import Array, Indices
 from dikbench.viewer.frames import Frames, common_times
-from dikbench.viewer.legend import COLOURS, PATH_COLOURS, name_of
+from dikbench.viewer.legend import COLOURS, PATH_COLOURS, names_of
 from dikbench.viewer.limit_use import Nearness
 from dikbench.viewer.moving_joints import moving_joints
 from dikbench.viewer.nodes import (
@@ -58,11 +58,10 @@ class ReplayScene:
         side = side_of(recordings[0].scenario.robot, path_points(recordings[0].scenario))
         points = [_points(recording, side) for recording in recordings]
         offsets = _side_by_side(points, side)
+        named = zip(recordings, names_of(recordings), offsets, points, strict=True)
         self._shown = [
-            _Shown(server.scene, recording, self.times, f"/trial{number}", at, cloud)
-            for number, (recording, at, cloud) in enumerate(
-                zip(recordings, offsets, points, strict=True)
-            )
+            _Shown(server.scene, recording, name, self.times, f"/trial{number}", at, cloud)
+            for number, (recording, name, at, cloud) in enumerate(named)
         ]
         everything = np.vstack([cloud + at for cloud, at in zip(points, offsets, strict=True)])
         camera_of(everything, side).place(server)
@@ -82,6 +81,7 @@ class _Shown:
         self,
         scene: viser.SceneApi,
         recording: Recording,
+        name: str,
         times: Array,
         node: str,
         offset: Array,
@@ -89,7 +89,7 @@ class _Shown:
     ) -> None:
         self._frames = Frames.of(recording, times)
         self._end = recording.trace.steps * recording.trace.dt
-        self._name = name_of(recording)
+        self._name = name
         robot, scenario = recording.scenario.robot, recording.scenario
         scene.add_frame(node, show_axes=False, position=offset)
         robot_node = f"{node}/robot"

@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import urllib.request
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -25,16 +25,18 @@ from dikbench.arrays import Array
 from dikbench.cli import commands
 from dikbench.metrics import motion_of
 from dikbench.plugins.building import make_scenario
-from dikbench.robots.collision.obstacles import CapsuleObstacle, SphereObstacle
+from dikbench.problem.constraints import CollisionConstraint
+from dikbench.robots.collision.obstacles import BoxObstacle, CapsuleObstacle, SphereObstacle
 from dikbench.robots.robot import Robot
 from dikbench.simulation.trace import Trace
 from dikbench.study.trial import Trial
-from dikbench.viewer.legend import COLOURS, PATH_COLOURS
+from dikbench.viewer.legend import COLOURS, PATH_COLOURS, names_of
 from dikbench.viewer.limit_use import Nearness, joint_nearness
 from dikbench.viewer.moving_joints import joint_nodes
 from dikbench.viewer.nodes import obstacles_of
 from dikbench.viewer.recording import Recording, find_recording
 from dikbench.viewer.replay import write_replay
+from dikbench.viewer.static_scene import surroundings
 
 pytest.importorskip("viser", reason="viser is not installed: pip install 'dikbench[replay]'")
 
@@ -255,6 +257,15 @@ def test_two_trials_stand_side_by_side(films: dict[str, Film]) -> None:
         np.testing.assert_allclose(found, alone.world(tool), atol=TOLERANCE)
 
 
+@pytest.mark.parametrize("speed", ["nan", "inf", "0", "-1"])
+def test_a_speed_that_is_none_is_one_line(speed: str) -> None:
+    """No replay stands still, runs backwards or is over at once."""
+    result = dikbench("a", "--speed", speed)
+    assert result.exit_code == 2
+    assert "--speed" in result.output.splitlines()[-1]
+    assert result.output.splitlines()[-1].lower().startswith("error: ")
+
+
 def test_what_stands_in_the_way_and_what_is_carried(tmp_path: Path) -> None:
     """Obstacles and payload are where the scenario has them; a line joins the nearest bodies."""
     recordings = [by_hand("obstacle[robot=planar3r]"), by_hand("torque-limited[robot=ur5]")]
@@ -282,6 +293,39 @@ def test_what_stands_in_the_way_and_what_is_carried(tmp_path: Path) -> None:
         assert played.props[ball]["radius"] == 0.05
     assert not played.nodes("/trial0/robot/.*/payload")
     assert not played.nodes("/trial1/obstacles.*")
+
+
+def test_obstacles_of_every_shape() -> None:
+    """A ball, a capsule along its segment, and a turned box are drawn where they are."""
+    turned = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    obstacles = (
+        SphereObstacle((1.0, 2.0, 3.0), 0.2),
+        CapsuleObstacle((0.0, 1.0, 0.0), (0.0, 1.0, 2.0), 0.1),
+        BoxObstacle((3.0, 0.0, 0.0), (0.1, 0.2, 0.3), turned),
+    )
+    scenario = make_scenario("reach[robot=planar3r,duration=0.2]")
+    scenario = replace(scenario, constraints=(CollisionConstraint(obstacles),))
+    film = Film([(0.0, message) for message in surroundings(scenario).messages], [], 0.0)
+    played = film.at(0.0)
+    ball, capsule, box = (f"/obstacles/{number}" for number in range(3))
+    assert played.props[ball]["radius"] == played.props[capsule]["radius"] * 2 == 0.2
+    np.testing.assert_allclose(played.world(ball)[:3, 3], [1, 2, 3])
+    assert played.props[capsule]["height"] == 2
+    ends = [played.world(f"{capsule}/{end}")[:3, 3] for end in ("start", "end")]
+    np.testing.assert_allclose(ends, [[0, 1, 0], [0, 1, 2]], atol=1e-12)
+    assert played.props[box]["dimensions"] == [0.1, 0.2, 0.3]
+    np.testing.assert_allclose(played.world(box)[:3, :3], turned, atol=1e-12)
+    np.testing.assert_allclose(played.world(box)[:3, 3], [3, 0, 0])
+
+
+def test_names_tell_trials_apart() -> None:
+    """Formulations name trials; where they are the same, so does what differs of the trials."""
+    recording = by_hand("speed-sweep[robot=planar3r]")
+    other = replace(recording, trial=replace(recording.trial, reference="path", seed=3))
+    qp = replace(recording, trial=Trial.of("qp", "reach", "daqp"))
+    assert names_of([recording, qp]) == ["pinv", "qp with daqp"]
+    assert names_of([recording, other]) == ["pinv, by time, seed 0", "pinv, by path, seed 3"]
+    assert names_of([recording, recording]) == ["pinv", "pinv"]
 
 
 def by_hand(selector: str) -> Recording:
