@@ -198,6 +198,8 @@ def replay(trials: tuple[str, ...], results: Path | None, speed: float, html: Pa
     """
     if len(trials) > MOST_REPLAYED:
         raise DikbenchError(f"replay takes one trial, or two side by side; got {len(trials)}")
+    if not speed < float("inf"):
+        raise DikbenchError(f"--speed: expected a positive number, got {speed}")
     from dikbench.viewer.legend import captions, legend
     from dikbench.viewer.recording import find_recording
     from dikbench.viewer.replay import serve_replay, write_replay

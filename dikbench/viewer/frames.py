@@ -11,8 +11,9 @@ from dikbench.arrays import Array, Indices
 from dikbench.problem.constraints import CollisionConstraint
 from dikbench.robots.kinematics import Kinematics, placements
 from dikbench.viewer.limit_use import Nearness, Nearnesses, limit_states
-from dikbench.viewer.moving_joints import joint_coordinates, wxyz
+from dikbench.viewer.moving_joints import joint_coordinates
 from dikbench.viewer.recording import Recording
+from dikbench.viewer.target_poses import target_poses
 
 FRAMES_PER_SECOND: Final = 30
 
@@ -51,11 +52,10 @@ class Frames:
         kept, shown = np.unique(instants, return_inverse=True)
         states = limit_states(trace, recording.scenario, kept)
         everything = limit_states(trace, recording.scenario) if trace.steps else states
-        rotations, translations = recording.scenario.reference.placements(trace.tau[instants])
         return cls(
             times,
             joint_coordinates(robot, trace.q[kept])[shown],
-            np.array([[*at, *wxyz(R)] for at, R in zip(translations, rotations, strict=True)]),
+            target_poses(recording.scenario, trace.tau[instants]),
             placements(robot, robot.frame_id, trace.q)[:, :3, 3],
             np.max([*everything.values()], axis=0).max(axis=1, initial=Nearness.INSIDE),
             {kind: found[shown] for kind, found in states.items()},

@@ -64,6 +64,22 @@ def name_of(recording: Recording) -> str:
     return f"{trial.formulation}" + ("" if trial.solver == NO_SOLVER else f" with {trial.solver}")
 
 
+def names_of(recordings: list[Recording]) -> list[str]:
+    """Name each of some recordings, with what tells it from the others of its name."""
+    names = [name_of(recording) for recording in recordings]
+    if len(set(names)) == len(names):
+        return names
+    parts = [
+        (f"{t.scenario}", f"{t.plant} plant", f"by {t.reference}", f"seed {t.seed}")
+        for t in (recording.trial for recording in recordings)
+    ]
+    telling = [k for k, of_each in enumerate(zip(*parts, strict=True)) if len(set(of_each)) > 1]
+    return [
+        ", ".join([name, *(own[k] for k in telling)])
+        for name, own in zip(names, parts, strict=True)
+    ]
+
+
 def captions(recording: Recording, speed: float) -> list[str]:
     """Say what is replayed, in lines."""
     trial, trace = recording.trial, recording.trace

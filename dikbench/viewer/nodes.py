@@ -46,6 +46,9 @@ CAMERA_YAW_RAD: Final = np.deg2rad(50)
 
 FIELD_OF_VIEW_RAD: Final = 0.75
 
+WIDTH_OVER_HEIGHT: Final = 1.1
+"""What a window has at least, less the room of the captions."""
+
 SMALLEST_RADIUS_M: Final = 0.25
 """Radius about the middle that a camera sees at least."""
 
@@ -222,11 +225,22 @@ def side_of(robot: Robot, points: Array) -> Array:
     return unit
 
 
+def right_of(side: Array) -> Array:
+    """Return what is to the right (3,) for one who looks from a side (3,), horizontally."""
+    right = np.cross(-side, [0.0, 0.0, 1.0])
+    unit: Array = right / np.linalg.norm(right)
+    return unit
+
+
 def camera_of(points: Array, side: Array) -> Camera:
     """Place a camera on one side (3,) of points (k, 3) [m] such that it sees them all."""
-    middle = (points.max(axis=0) + points.min(axis=0)) / 2
-    radius = max(float(np.linalg.norm(points - middle, axis=1).max()), SMALLEST_RADIUS_M)
-    position = middle + radius / np.sin(FIELD_OF_VIEW_RAD / 2) * side
+    right = right_of(side)
+    axes = np.array([right, np.cross(right, -side), side])  # to the right, up, to the camera
+    low, high = _ends(points @ axes.T)
+    middle = (low + high) / 2 @ axes
+    width, height, depth = (high - low) / 2
+    half = max(1.1 * height, width / WIDTH_OVER_HEIGHT, SMALLEST_RADIUS_M)
+    position = middle + (depth + half / np.tan(FIELD_OF_VIEW_RAD / 2)) * side
     return Camera(tuple(np.round(position, 4).tolist()), tuple(np.round(middle, 4).tolist()))
 
 

@@ -34,8 +34,8 @@ SWATCH_HTML: Final = (
 REST_S: Final = 1.0
 """Time at the end before a replay begins anew."""
 
-SPEEDS: Final = ("0.05", "0.1", "0.25", "0.5", "1", "2", "4")
-"""Speeds to choose from, over the one that was asked for."""
+SPEEDS: Final = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
+"""Speeds to choose from, beside the one that was asked for."""
 
 
 def write_replay(recordings: list[Recording], speed: float, file: Path) -> None:
@@ -70,12 +70,12 @@ def serve_replay(recordings: list[Recording], speed: float) -> None:
     """
     with viser_server() as server:
         scene = ReplayScene(server, recordings, speed)
-        bar = _Bar(server, scene, _told(recordings, speed))
+        bar = _Bar(server, scene, speed, _told(recordings, speed))
         address = f"http://{HOST}:{server.get_port()}"
         try:
             print(f"{address} (Ctrl-C ends)", flush=True)
             webbrowser.open(address)
-            bar.play(speed)
+            bar.play()
         except KeyboardInterrupt:
             return
 
@@ -83,19 +83,22 @@ def serve_replay(recordings: list[Recording], speed: float) -> None:
 class _Bar:
     """The controls of a replay that is served: time, pause, speed."""
 
-    def __init__(self, server: viser.ViserServer, scene: ReplayScene, told: str) -> None:
+    def __init__(
+        self, server: viser.ViserServer, scene: ReplayScene, speed: float, told: str
+    ) -> None:
         self._server, self._scene, gui = server, scene, server.gui
-        gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
+        gui.configure_theme(show_logo=False, show_share_button=False, control_layout="fixed")
         end = float(scene.times[-1])
         # Its value is writable, which mypy does not see.
         self._time: Any = gui.add_slider(
             "time [s]", min=0.0, max=end, step=0.001, initial_value=0.0
         )
         self._playing = gui.add_checkbox("play", initial_value=True)
-        self._speed = gui.add_dropdown("speed, times", SPEEDS, initial_value="1")
+        speeds = [f"{each:g}" for each in sorted({*SPEEDS, speed})]
+        self._speed = gui.add_dropdown("speed", speeds, initial_value=f"{speed:g}")
         gui.add_html(f'<div style="padding:.6em 1em;font-size:13px">{told}</div>')
 
-    def play(self, speed: float) -> None:
+    def play(self) -> None:
         """Move the scene with the time, over and over, until interrupted."""
         times, shown, before, bar = self._scene.times, 0, time.monotonic(), self._time
         end = float(times[-1])
@@ -103,7 +106,7 @@ class _Bar:
             time.sleep(1 / FRAMES_PER_SECOND)
             now = time.monotonic()
             if self._playing.value:
-                at = bar.value + (now - before) * speed * float(self._speed.value)
+                at = bar.value + (now - before) * float(self._speed.value)
                 bar.value = 0.0 if bar.value >= end else min(at, end)
             before = now
             frame = int(np.abs(times - bar.value).argmin())

@@ -8,7 +8,7 @@ import numpy as np
 
 from dikbench.arrays import Array, Indices
 from dikbench.viewer.frames import Frames, common_times
-from dikbench.viewer.legend import COLOURS, PATH_COLOURS, name_of
+from dikbench.viewer.legend import COLOURS, PATH_COLOURS, names_of
 from dikbench.viewer.limit_use import Nearness
 from dikbench.viewer.moving_joints import moving_joints
 from dikbench.viewer.nodes import (
@@ -20,6 +20,7 @@ from dikbench.viewer.nodes import (
     camera_of,
     obstacle_points,
     path_points,
+    right_of,
     robot_points,
     side_of,
 )
@@ -36,7 +37,7 @@ ACHIEVED_WIDTH, NEAREST_WIDTH = 3.0, 3.0
 
 FLOOR_MARGIN_M: Final = 0.5
 
-LABEL_SHARE: Final = 0.15
+LABEL_SHARE: Final = 0.06
 """Height of a label above what it names, as a share of that's height."""
 
 POSES_IN_VIEW: Final = 9
@@ -54,14 +55,13 @@ class ReplayScene:
         self, server: viser.ViserServer, recordings: list[Recording], speed: float
     ) -> None:
         self.times = common_times(recordings, speed)
-        points = [_points(recording) for recording in recordings]
         side = side_of(recordings[0].scenario.robot, path_points(recordings[0].scenario))
+        points = [_points(recording, side) for recording in recordings]
         offsets = _side_by_side(points, side)
+        named = zip(recordings, names_of(recordings), offsets, points, strict=True)
         self._shown = [
-            _Shown(server.scene, recording, self.times, f"/trial{number}", at, cloud, side)
-            for number, (recording, at, cloud) in enumerate(
-                zip(recordings, offsets, points, strict=True)
-            )
+            _Shown(server.scene, recording, name, self.times, f"/trial{number}", at, cloud)
+            for number, (recording, name, at, cloud) in enumerate(named)
         ]
         everything = np.vstack([cloud + at for cloud, at in zip(points, offsets, strict=True)])
         camera_of(everything, side).place(server)
@@ -81,15 +81,15 @@ class _Shown:
         self,
         scene: viser.SceneApi,
         recording: Recording,
+        name: str,
         times: Array,
         node: str,
         offset: Array,
         points: Array,
-        side: Array,
     ) -> None:
         self._frames = Frames.of(recording, times)
         self._end = recording.trace.steps * recording.trace.dt
-        self._name = name_of(recording)
+        self._name = name
         robot, scenario = recording.scenario.robot, recording.scenario
         scene.add_frame(node, show_axes=False, position=offset)
         robot_node = f"{node}/robot"
@@ -114,11 +114,8 @@ class _Shown:
                 thickness=NEAREST_WIDTH,
                 thickness_units="screen",
             )
-        up = np.cross(_right(side), -side)
-        heights, middle = points @ up, (points.max(axis=0) + points.min(axis=0)) / 2
-        top = middle + (heights.max() - middle @ up + LABEL_SHARE * np.ptp(heights)) * up
         self._label = scene.add_label(
-            f"{node}/label", self._name, position=top, anchor="bottom-center"
+            f"{node}/label", self._name, position=points[-1], anchor="bottom-center"
         )
 
     def show(self, frame: int) -> None:
@@ -152,17 +149,21 @@ class _Shown:
         return said + (f"   past its limit: {', '.join(past)}" if past else "")
 
 
-def _points(recording: Recording) -> Array:
-    """Points (k, 3) [m] that the camera is to see of a recording."""
+def _points(recording: Recording, side: Array) -> Array:
+    """Points (k, 3) [m] that the camera on one side is to see; the last one is for a label."""
     scenario, q = recording.scenario, recording.trace.q
     chosen = np.linspace(0, len(q) - 1, POSES_IN_VIEW).astype(int)
     robot = robot_points(scenario.robot, q[chosen])
-    return np.vstack([robot, path_points(scenario), obstacle_points(scenario)])
+    points = np.vstack([robot, path_points(scenario), obstacle_points(scenario)])
+    up = np.cross(right_of(side), -side)
+    heights, middle = points @ up, (points.max(axis=0) + points.min(axis=0)) / 2
+    above = heights.max() - middle @ up + LABEL_SHARE * np.ptp(heights)
+    return np.vstack([points, middle + above * up])
 
 
 def _side_by_side(points: list[Array], side: Array) -> list[Array]:
     """Choose where to put clouds of points (k, 3) so that they stand beside each other, (3,)."""
-    right = _right(side)
+    right = right_of(side)
     across = [cloud @ right for cloud in points]
     gap = GAP_SHARE * max(float(np.ptp(each)) for each in across)
     offsets, edge = [np.zeros(3)], float(across[0].max())
@@ -170,13 +171,6 @@ def _side_by_side(points: list[Array], side: Array) -> list[Array]:
         offsets.append((edge + gap - each.min()) * right)
         edge += gap + float(np.ptp(each))
     return offsets
-
-
-def _right(side: Array) -> Array:
-    """Return what is to the right (3,) for one who looks from a side (3,), horizontally."""
-    right = np.cross(-side, [0.0, 0.0, 1.0])
-    unit: Array = right / np.linalg.norm(right)
-    return unit
 
 
 def _add_floor(scene: viser.SceneApi, points: Array) -> None:

@@ -16,6 +16,10 @@ STANDING_STILL_M: Final = 1e-6
 """Points of a path nearer to each other than this are one."""
 
 
+ALONG_THE_TANGENT: Final = 1e-3
+"""Length of what is left of a normal across the tangent, below which another is taken."""
+
+
 def tube(points: Array, radius: float) -> Mesh | None:
     """Build a tube about a path; None where it does not move.
 
@@ -27,15 +31,21 @@ def tube(points: Array, radius: float) -> Mesh | None:
     points = points[np.concatenate([[True], moved])]
     if len(points) < 2:
         return None
+    before = np.diff(points, axis=0, prepend=2 * points[:1] - points[1:2])
     tangents = np.gradient(points, axis=0)
-    tangents /= np.maximum(np.linalg.norm(tangents, axis=1, keepdims=True), STANDING_STILL_M)
+    turning_back = np.linalg.norm(tangents, axis=1) < STANDING_STILL_M
+    tangents[turning_back] = before[turning_back]
+    tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
     angle = np.linspace(0.0, 2 * np.pi, RING, endpoint=False)[:, None]
     normal = np.eye(3)[np.abs(tangents[0]).argmin()]
     rings = []
     for at, tangent in zip(points, tangents, strict=True):
         # The normal of the ring before, as little turned as possible.
         normal = normal - (normal @ tangent) * tangent
-        normal = normal / max(float(np.linalg.norm(normal)), STANDING_STILL_M)
+        if np.linalg.norm(normal) < ALONG_THE_TANGENT:
+            least = np.eye(3)[np.abs(tangent).argmin()]
+            normal = least - (least @ tangent) * tangent
+        normal = normal / np.linalg.norm(normal)
         beside = np.cross(tangent, normal)
         rings.append(at + radius * (np.cos(angle) * normal + np.sin(angle) * beside))
     first = np.arange(RING * (len(points) - 1))

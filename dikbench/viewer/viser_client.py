@@ -43,7 +43,7 @@ def client_html() -> str:
 def viser_server() -> Iterator[viser.ViserServer]:
     """Start a viser server on a free port of this machine, and stop it afterwards.
 
-    A scene can be built and serialised in no other way; this takes 50 ms.
+    A scene can be built and serialised in no other way; this takes 10 ms.
 
     Raises:
         DikbenchError: if viser is missing.

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from dikbench.arrays import Array
 from dikbench.metrics import METRICS, motion_of
 from dikbench.plugins.building import make_scenario
+from dikbench.problem.constraints import CollisionConstraint
 from dikbench.robots.loading import load_robot
+from dikbench.scenario.scenario import Scenario
 from dikbench.simulation.trace import Trace
-from dikbench.viewer.limit_use import Nearness, nearness
+from dikbench.viewer.limit_use import Nearness, joint_nearness, limit_states, nearness
 
 INSIDE, NEAR, PAST = Nearness
 
@@ -62,3 +67,56 @@ def test_past_agrees_with_the_metric() -> None:
     assert 0 < share < 1
     assert violating.mean() == share
     assert (found == PAST).any()
+
+
+def moved(scenario: Scenario, q: Array, v: Array | None = None) -> Trace:
+    """A trace of configurations (n + 1, nq), at rest unless velocities (n, nv) are given."""
+    return replace(trace(q, np.zeros((len(q) - 1, scenario.robot.nv)) if v is None else v), dt=0.01)
+
+
+def test_distances_colour_both_links_of_a_pair() -> None:
+    """What is nearer than the margin is past, whenever the metrics say that anything is."""
+    scenario = make_scenario("obstacle[robot=panda]")
+    (constraint,) = scenario.constraints
+    assert isinstance(constraint, CollisionConstraint)
+    assert scenario.oracle is not None
+    q = scenario.oracle[::10]
+    motion = moved(scenario, q)
+    smallest = motion_of(motion, scenario).distances
+    past = smallest < constraint.margin - 1e-4
+    states = limit_states(motion, scenario)
+    assert set(states) == {"position", "speed", "distance"}
+    assert past.any()
+    assert not past.all()
+    np.testing.assert_array_equal((states["distance"] == PAST).any(axis=1), past)
+    assert not (states["distance"] == PAST)[past].all(axis=1).any()  # not the whole robot
+
+
+def test_torques_colour_their_joint() -> None:
+    """A joint that is accelerated too much is past its torque limit, as the metrics have it."""
+    scenario = make_scenario("torque-limited[robot=ur5]")
+    q = np.repeat(scenario.q0[None], 4, axis=0)
+    v = np.zeros((3, 6))
+    v[1, 5] = 10.0
+    motion = moved(scenario, q, v)
+    states = limit_states(motion, scenario)["torque"]
+    usage = motion_of(motion, scenario).torque_usage
+    np.testing.assert_array_equal((states[:-1] == PAST).any(axis=1), usage > 1)
+    assert states[1, 5] == PAST
+    assert states[0].max() < PAST
+    shown = limit_states(motion, scenario, np.array([0, 3]))["torque"]
+    np.testing.assert_array_equal(shown, [states[0], states[1:].max(axis=0)])
+
+
+@pytest.mark.parametrize("instants", [[0], [0, 5, 19, 20], [3, 4]])
+def test_what_happens_between_instants_is_kept(instants: list[int]) -> None:
+    """The state at an instant is the worst since the one before."""
+    scenario = make_scenario("reach[robot=planar3r,duration=0.2]")
+    rng = np.random.default_rng(1)
+    motion = trace(rng.uniform(-3, 3, (21, 3)), rng.uniform(-2.2, 2.2, (20, 3)))
+    every = joint_nearness(motion, scenario)
+    np.testing.assert_array_equal(every, nearness(motion, scenario.robot.limits))
+    found = joint_nearness(motion, scenario, np.array(instants))
+    starts = [0, *(k + 1 for k in instants[:-1])]
+    expected = [every[a : b + 1].max(axis=0) for a, b in zip(starts, instants, strict=True)]
+    np.testing.assert_array_equal(found, expected)
