@@ -12,8 +12,8 @@ import pandas as pd
 
 from dikbench.report.interactive.charts import ROWS
 from dikbench.report.interactive.page_rows import as_columns, page_rows
-from dikbench.report.interactive.specification import Charts, bundle, make_charts
 from dikbench.report.interactive.replays import make_replays
+from dikbench.report.interactive.specification import Charts, bundle, make_charts
 from dikbench.report.interactive.trace_charts import trace_charts
 from dikbench.report.selection.categories import CATEGORIES
 from dikbench.statistics.first_places import FEWEST_SCENARIOS

@@ -14,8 +14,9 @@ from dikbench.report.interactive.chosen_runs import chosen_runs
 from dikbench.run.again import RunAgain, run_again
 from dikbench.scenario.scenario import Scenario
 from dikbench.viewer.limit_use import joint_nearness
-from dikbench.viewer.moving_joints import joint_coordinates, wxyz
+from dikbench.viewer.moving_joints import joint_coordinates
 from dikbench.viewer.static_scene import static_scene, surroundings
+from dikbench.viewer.target_poses import target_poses
 from dikbench.viewer.viser_client import client_html, has_viser
 
 INSTANTS: Final = 150
@@ -95,7 +96,7 @@ def _run(again: RunAgain) -> dict[str, Any]:
         "dt": trace.dt,
         "step": steps.tolist(),
         "joints": _differences(joint_coordinates(scenario.robot, trace.q[steps])),
-        "target": _differences(poses),
+        "target": _differences(targets),
         "near": ["".join(map(str, row)) for row in near.tolist()],
         **{
             name: [None if not np.isfinite(x) else round(float(x), 3) for x in values]
