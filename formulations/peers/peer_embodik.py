@@ -18,7 +18,6 @@ from formulations.peers.models import (
     TOOL,
     UNLIMITED,
     check_same,
-    coordinates,
     position_limits,
     urdf_of,
 )
@@ -69,17 +68,16 @@ class PeerEmbodik(Peer):
             return "EmbodiK damps singular values near 0.1"
         if postures_of(problem):
             return "EmbodiK is asked for the first task alone"
-        return "EmbodiK scales the task before it has used all joints"
+        return "EmbodiK scales the task before it has used all joints, or leaves it"
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
         V = problem.primary.V
         peer = _set_up(problem.robot, self, problem.dt)
-        q = coordinates(problem.robot, problem.q)
-        peer.model.update_configuration(q)
+        peer.model.update_configuration(problem.q)
         R = peer.placement()[:3, :3]
         peer.task.set_target_velocity(np.concatenate([R @ V[:3], R @ V[3:]]))
-        found = peer.solver.solve_velocity(q)
+        found = peer.solver.solve_velocity(problem.q)
         if found.status.name != "SUCCESS":
             raise SolverFailed(f"EmbodiK: {found.status.name}")
         v: Array = np.array(found.joint_velocities)
@@ -105,7 +103,7 @@ class _Embodik:
             file = Path(folder) / "robot.urdf"
             file.write_text(urdf_of(robot, position), encoding="utf-8")
             self.model: Any = embodik.RobotModel(str(file))
-        self._robot, self._axes = robot, embodik.ReferenceFrame.LOCAL
+        self._axes = embodik.ReferenceFrame.LOCAL
         self.solver: Any = embodik.KinematicsSolver(self.model)
         self.solver.dt = dt
         self.task: Any = self.solver.add_frame_task("task", TOOL, embodik.TaskType.FRAME_POSE)
@@ -126,7 +124,7 @@ class _Embodik:
         return found
 
     def _at(self, q: Array) -> tuple[Array, Array]:
-        self.model.update_configuration(coordinates(self._robot, q))
+        self.model.update_configuration(q)
         return self.placement(), self.model.get_frame_jacobian(TOOL, self._axes)
 
 
