@@ -70,12 +70,12 @@ def urdf_of(robot: Robot, position: Interval) -> str:
         position: the position limits to write.
     """
     model, document = robot.model, ET.Element("robot", name=robot.model.name or "robot")
-    data = model.createData()
+    data, neutral = model.createData(), pin.neutral(model)
     velocity = np.minimum(velocity_limits(robot), UNLIMITED)
     ET.SubElement(document, "link", name="world")
     for index, joint in enumerate(_joints(robot), start=1):
         k = joint.idx_v
-        axis = pin.computeJointJacobian(model, data, pin.neutral(model), index)[:, k]
+        axis = pin.computeJointJacobian(model, data, neutral, index).reshape(6, -1)[:, k]
         turns = bool(np.any(axis[3:]))
         limited = not turns or np.isfinite([position.lower[k], position.upper[k]]).any()
         kind = ("revolute" if limited else "continuous") if turns else "prismatic"
@@ -114,8 +114,9 @@ def check_same(robot: Robot, peer: str, at: At) -> None:
         q = robot.inside(pin.integrate(robot.model, robot.q0, random.uniform(-1, 1, robot.nv)))
         kinematics.update(q)
         placement, J = at(q)
-        off = np.abs(placement - kinematics.placement(robot.frame_id).homogeneous).max()
-        off = max(off, np.abs(J - kinematics.jacobian(robot.frame_id)).max())
+        ours = kinematics.placement(robot.frame_id).homogeneous
+        apart = (placement - ours).ravel(), (J - kinematics.jacobian(robot.frame_id)).ravel()
+        off = np.abs(np.concatenate(apart)).max()
         if not off <= SAME:
             raise DikbenchError(
                 f"robot {robot.name}: the model of {peer} differs by {off:.1e} in the placement or "

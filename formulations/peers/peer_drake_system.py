@@ -15,7 +15,6 @@ from dikbench.problem import (
     Array,
     DikProblem,
     Drawn,
-    LimitKind,
     ProblemPart,
     Range,
     Robot,
@@ -37,7 +36,8 @@ class PeerDrakeSystem(Peer):
 
     Its recipe is that of `drake-system`: least squares, joint centring, joint velocity limits, the
     system's own constants of the last. The plant is Drake's, from a URDF of the robot; the solver
-    OSQP, Drake's own, which stops early near singularities. Where it fails the system answers 0.
+    OSQP, Drake's own, which stops early, near singularities far from the optimum, and passes bounds
+    by up to 1e-4 rad/s: nothing is promised. Where it fails the system answers 0.
 
     Attributes:
         limits: own: velocity and position limits of the model; ours: those of the problem.
@@ -59,12 +59,6 @@ class PeerDrakeSystem(Peer):
         """See `Peer`."""
         given = f"tracking_weight={self.tracking_weight},centering={self.centering}"
         return f"drake-system[{given}]"
-
-    @property
-    def keeps(self) -> frozenset[LimitKind]:
-        """The velocity limits of the problem, where it is told of them."""
-        kept: frozenset[LimitKind] = frozenset({"velocity"})
-        return kept if self.limits == "ours" else frozenset()
 
     @property
     def sees(self) -> frozenset[ProblemPart]:
