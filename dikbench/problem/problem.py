@@ -124,6 +124,11 @@ class Formulation(Protocol):
     that do not come with dikbench, and the command that installs each. A paragraph `Source: ...` in
     its docstring names the paper. The same problem gives the same velocity.
 
+    A peer, another library as a formulation, says with `computes_kinematics = True` that its call
+    is a whole tick, with `counterpart` which formulation (a selector) is to answer alike, with
+    `known_difference(problem, velocity)` why it did not here (an empty text: no reason is known;
+    the velocity is None where it has none), and with `package` which distribution it is.
+
     With `batched = True` it says that `velocity` also answers N control steps at once (see
     `DikProblem`), (N, nv), each as if it were alone: matrices with the functions of
     `dikbench.problem`, everything else element by element or over the last axis. NaN in a row
@@ -148,6 +153,11 @@ def program_of(formulation: Formulation) -> ProgramKind | None:
 def promises_of(formulation: Formulation) -> frozenset[LimitKind]:
     """Return the kinds of limits that the formulation promises to keep."""
     return frozenset(getattr(formulation, "keeps", ()))
+
+
+def computes_kinematics(formulation: Formulation) -> bool:
+    """Whether the formulation computes kinematics of its own, as part of its call."""
+    return bool(getattr(formulation, "computes_kinematics", False))
 
 
 def not_installed(formulation: Formulation | type) -> str:

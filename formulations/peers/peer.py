@@ -21,6 +21,17 @@ from formulations.peers.models import has_plain_joints
 WITH_PEERS: Final = 'pip install "dikbench[peers]"'
 WITH_DRAKE: Final = 'pip install "dikbench[drake]"'
 
+OUTSIDE_RAD: Final = 1e-6
+"""A joint that is less outside of a limit [rad or m] counts as inside."""
+
+TOLERANCE_RAD: Final = 1e-6
+"""daqp's tolerance of constraints, in displacements [rad or m]: over dt in velocities."""
+
+PASSED_RAD_S: Final = 1e-7
+"""A bound that is passed by less [rad/s] is kept."""
+
+IN_DISPLACEMENTS: Final = "its daqp passes bounds by 1e-6 in displacements, 1e-6/dt in velocities"
+
 Whose = Literal["own", "ours"]
 """The peer's own, or those of the problem."""
 
@@ -35,6 +46,7 @@ class Peer(Parameters):
     """
 
     requires: ClassVar[Mapping[str, str]]
+    package: ClassVar[str]
     computes_kinematics: ClassVar[bool] = True
     every_row: ClassVar[bool] = False
     """Whether it has to be asked for all six rows of a twist."""
@@ -58,9 +70,37 @@ class Peer(Parameters):
             return "is asked for one task of first priority, on the robot's task frame"
         return ""
 
-    def known_difference(self, problem: DikProblem) -> str:
-        """Why its velocity may differ from its counterpart's here; empty where nothing is known."""
+    def known_difference(self, problem: DikProblem, velocity: Array | None) -> str:
+        """Why it may differ from its counterpart here; empty where no reason is known.
+
+        Args:
+            problem: the problem.
+            velocity: its velocity, (nv,); None where it has none.
+        """
         return ""
+
+
+def is_outside(problem: DikProblem) -> bool:
+    """Say whether a joint is outside its position limits, by more than rounding."""
+    to_lower, to_upper = problem.limits.to_lower, problem.limits.to_upper
+    if to_lower is None or to_upper is None:
+        return False
+    return bool(min(to_lower.min(), to_upper.min()) < -OUTSIDE_RAD)
+
+
+def passes_by_tolerance(problem: DikProblem, velocity: Array | None, gain: float) -> bool:
+    """Say whether a velocity passes a bound by no more than a tolerance of displacements allows.
+
+    Args:
+        problem: the problem.
+        velocity: the velocity, (nv,), or None.
+        gain: share of the distance to a position limit per step.
+    """
+    if velocity is None:
+        return False
+    box = problem.box("gain", gain)
+    most = float(np.maximum(velocity - box.upper, box.lower - velocity).max())
+    return PASSED_RAD_S < most <= TOLERANCE_RAD / problem.dt * (1 + 1e-3) + PASSED_RAD_S
 
 
 def no_pose(problem: DikProblem) -> str:

@@ -30,7 +30,7 @@ from formulations.peers.models import (
     position_limits,
     urdf_of,
 )
-from formulations.peers.peer import WITH_DRAKE, Peer, Whose, postures_of, six_rows
+from formulations.peers.peer import WITH_DRAKE, Peer, Whose, is_outside, postures_of, six_rows
 
 
 @dataclass(frozen=True)
@@ -52,6 +52,7 @@ class PeerDrake(Peer):
     centering: Annotated[float, Range(0.0, unit="1/s"), Drawn(0.0, 10.0)] = 0.0
 
     requires: ClassVar[Mapping[str, str]] = MappingProxyType({"pydrake": WITH_DRAKE})
+    package: ClassVar[str] = "drake"
 
     @property
     def counterpart(self) -> str:
@@ -69,12 +70,11 @@ class PeerDrake(Peer):
         """The posture, where joints are drawn to one."""
         return frozenset({"postures"}) if self.centering else frozenset()
 
-    def known_difference(self, problem: DikProblem) -> str:
+    def known_difference(self, problem: DikProblem, velocity: Array | None) -> str:
         """See `Peer`."""
-        to_lower, to_upper = problem.limits.to_lower, problem.limits.to_upper
         if self.limits == "own":
             return "Drake has no limits of its own"
-        if to_lower is not None and to_upper is not None and min(*to_lower, *to_upper) < 0:
+        if is_outside(problem):
             return "outside position limits Drake returns within one step, or finds nothing"
         m, n = problem.primary.J.shape
         return "Drake's OSQP stops early" if n > m else ""

@@ -52,6 +52,7 @@ class PeerDrakeSystem(Peer):
     centering: Annotated[float, Range(0.0, unit="1/s"), Drawn(0.0, 10.0)] = 1.0
 
     requires: ClassVar[Mapping[str, str]] = MappingProxyType({"pydrake": WITH_DRAKE})
+    package: ClassVar[str] = "drake"
     every_row: ClassVar[bool] = True
 
     @property
@@ -65,7 +66,7 @@ class PeerDrakeSystem(Peer):
         """The posture, where joints are drawn to one."""
         return frozenset({"postures"}) if self.centering else frozenset()
 
-    def known_difference(self, problem: DikProblem) -> str:
+    def known_difference(self, problem: DikProblem, velocity: Array | None) -> str:
         """See `Peer`."""
         if self.limits == "own" and not as_modelled(problem, velocity=True):
             return "Drake's own limits are those of the model"

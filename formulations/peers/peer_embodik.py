@@ -47,6 +47,7 @@ class PeerEmbodik(Peer):
     damping: Whose = "own"
 
     requires: ClassVar[Mapping[str, str]] = MappingProxyType({"embodik": WITH_PEERS})
+    package: ClassVar[str] = "embodik"
     every_row: ClassVar[bool] = True
 
     @property
@@ -60,15 +61,16 @@ class PeerEmbodik(Peer):
         kept: frozenset[LimitKind] = frozenset({"position", "velocity"})
         return kept if self.limits == "ours" else frozenset()
 
-    def known_difference(self, problem: DikProblem) -> str:
+    def known_difference(self, problem: DikProblem, velocity: Array | None) -> str:
         """See `Peer`."""
         if self.limits == "own" and not as_modelled(problem, velocity=True):
             return "EmbodiK's own limits are those of the model"
         if self.damping == "own":
             return "EmbodiK damps singular values near 0.1"
-        if postures_of(problem):
-            return "EmbodiK is asked for the first task alone"
-        return "EmbodiK scales the task before it has used all joints, or leaves it"
+        alone = (
+            "EmbodiK is asked for the first task alone, " if postures_of(problem) else "EmbodiK "
+        )
+        return f"{alone}scales it before it has used all joints, or leaves it"
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

@@ -32,6 +32,7 @@ class PeerJParse(Peer):
     threshold: Annotated[float, Range(above=0.0, below=1.0), Drawn(0.01, 0.5, log=True)] = 0.1
 
     requires: ClassVar[Mapping[str, str]] = MappingProxyType({"jparse_robotics": WITH_PEERS})
+    package: ClassVar[str] = "jparse-robotics"
     every_row: ClassVar[bool] = True
 
     @property

@@ -22,7 +22,18 @@ from dikbench.problem import (
     Solve,
 )
 from formulations.peers.models import TOOL, check_same, coordinates, position_limits, urdf_of
-from formulations.peers.peer import WITH_PEERS, Peer, Whose, no_pose, pose_of, postures_of, six_rows
+from formulations.peers.peer import (
+    IN_DISPLACEMENTS,
+    WITH_PEERS,
+    Peer,
+    Whose,
+    is_outside,
+    no_pose,
+    passes_by_tolerance,
+    pose_of,
+    postures_of,
+    six_rows,
+)
 from formulations.peers.peer_pink import in_velocities
 from formulations.peers.same_limits import as_modelled
 
@@ -51,6 +62,7 @@ class PeerMink(Peer):
     solver: Whose = "own"
 
     requires: ClassVar[Mapping[str, str]] = MappingProxyType({"mink": WITH_PEERS})
+    package: ClassVar[str] = "mink"
     sees: ClassVar[frozenset[ProblemPart]] = frozenset({"postures", "weights"})
 
     @property
@@ -73,15 +85,16 @@ class PeerMink(Peer):
         """See `Peer`."""
         return no_pose(problem) or super().refuses(problem)
 
-    def known_difference(self, problem: DikProblem) -> str:
+    def known_difference(self, problem: DikProblem, velocity: Array | None) -> str:
         """See `Peer`."""
-        to_lower, to_upper = problem.limits.to_lower, problem.limits.to_upper
-        if to_lower is not None and to_upper is not None and min(*to_lower, *to_upper) < 0:
+        if is_outside(problem):
             return "outside position limits mink returns at once"
         if self.limits == "own" and not as_modelled(problem, velocity=False):
             return "mink's own limits are the model's configuration limits, without velocities"
         if problem.v_prev is not None and problem.limits.joint.acceleration is not None:
             return "mink has no acceleration limit"
+        if self.solver == "own" and passes_by_tolerance(problem, velocity, 0.95):
+            return IN_DISPLACEMENTS
         task, _ = pose_of(problem)
         turned = np.arccos(np.clip((np.trace(task.relative.rotation) - 1) / 2, -1, 1))
         if turned < IDENTITY_BELOW:

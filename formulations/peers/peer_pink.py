@@ -23,7 +23,18 @@ from dikbench.problem import (
     Solve,
 )
 from formulations.peers.models import check_same
-from formulations.peers.peer import WITH_PEERS, Peer, Whose, no_pose, pose_of, postures_of, six_rows
+from formulations.peers.peer import (
+    IN_DISPLACEMENTS,
+    WITH_PEERS,
+    Peer,
+    Whose,
+    is_outside,
+    no_pose,
+    passes_by_tolerance,
+    pose_of,
+    postures_of,
+    six_rows,
+)
 from formulations.peers.same_limits import as_modelled
 
 
@@ -48,6 +59,7 @@ class PeerPink(Peer):
     solver: Whose = "own"
 
     requires: ClassVar[Mapping[str, str]] = MappingProxyType({"pink": WITH_PEERS})
+    package: ClassVar[str] = "pin-pink"
     sees: ClassVar[frozenset[ProblemPart]] = frozenset({"postures", "weights"})
 
     @property
@@ -70,13 +82,14 @@ class PeerPink(Peer):
         """See `Peer`."""
         return no_pose(problem) or super().refuses(problem)
 
-    def known_difference(self, problem: DikProblem) -> str:
+    def known_difference(self, problem: DikProblem, velocity: Array | None) -> str:
         """See `Peer`."""
-        to_lower, to_upper = problem.limits.to_lower, problem.limits.to_upper
-        if to_lower is not None and to_upper is not None and min(*to_lower, *to_upper) < 0:
+        if is_outside(problem):
             return "outside position limits Pink refuses to answer"
         if self.limits == "own" and not as_modelled(problem, velocity=True):
             return "Pink's own limits are those of the model"
+        if self.solver == "own" and passes_by_tolerance(problem, velocity, 0.5):
+            return IN_DISPLACEMENTS
         return "limits that contradict each other have no solution" if problem.relaxed else ""
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
