@@ -20,11 +20,15 @@ from dikbench.report.drawing.figure import Figure
 from dikbench.report.pages.backticks import to_html
 from dikbench.report.tables.table import Column, TableCell, shown
 
-SECTIONS: Final = (
+PEERS: Final[str] = "peers"
+"""The section that only runs with peers have."""
+
+SECTIONS: Final[tuple[tuple[str, str], ...]] = (
     ("summary", "Summary"),
     ("tables", "Tables"),
     ("failures", "Failures"),
     ("return-codes", "Return codes"),
+    (PEERS, "Other libraries"),
     ("figures", "Figures"),
     ("families", "Families"),
     ("formulations", "Formulations"),
@@ -100,7 +104,8 @@ def render_html(contents: Contents, figures: Path) -> str:
         "capitalize_first": lambda text: text[:1].upper() + text[1:],
     }
     template = environment.get_template("page.html.j2")
-    given = {"contents": contents, "sections": SECTIONS, "assets": _assets()}
+    sections = [each for each in SECTIONS if each[0] != PEERS or len(contents.peers)]
+    given = {"contents": contents, "sections": sections, "assets": _assets()}
     bare = template.render(figures=[], **given)
     room = (MOST - len(bare.encode())) * 3 // 4  # of four characters a figure has three bytes
     return template.render(figures=_inlined(contents.figures, figures, room), **given)
