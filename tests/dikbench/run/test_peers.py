@@ -46,7 +46,7 @@ class Other(Parameters):
         return "it is fast" if self.fast(problem) else ""
 
     def fast(self, problem):
-        return np.linalg.norm(problem.primary.V) > 0.05
+        return np.linalg.norm(problem.primary.V) > 0.5
 
     def velocity(self, problem, solve):
         v = DampedLeastSquares(damping=0.1).velocity(problem, solve)
