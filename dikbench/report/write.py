@@ -48,6 +48,8 @@ def write_report(path: Path) -> str:
         raise DikbenchError(f"report in {path} cannot be written: {reason}") from None
     counts = ", ".join(f"{number} {what}" for number, what in contents.counts)
     printed = [*map(to_text, contents.tables), f"{RETURN_CODES}\n\n{codes}\n", f"{counts}.\n"]
+    if len(contents.peers):
+        printed.append(f"{contents.peers_note}\n\n{markdown_rows(contents.peers)}\n")
     for limitation in contents.limitations:
         printed += [f"- {limitation.text}", *(f"  - {case}" for case in limitation.cases)]
     return "\n".join(printed)
