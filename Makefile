@@ -48,7 +48,10 @@ benchmark-laws:  ## what the laws without a solver cost, as ratios to dls
 benchmark-metrics:  ## what metrics and rechecks cost per step, alone and together
 	$(PYTHON) tests/benchmarks/measuring.py
 
+benchmark-peers: ## whole ticks and velocities of other libraries beside ours (minutes)
+	$(PYTHON) -m pip install --quiet -e ".[peers,drake]" && $(PYTHON) -m dikbench run peers
+
 constraints:     ## the installed versions become the tested ones
 	.venv/bin/pip freeze --exclude-editable --exclude pip --exclude setuptools > constraints.txt
 
-.PHONY: help setup test test-long test-random lint format contract quick benchmark benchmark-scenarios benchmark-solvers benchmark-laws benchmark-metrics mutation constraints
+.PHONY: help setup test test-long test-random lint format contract quick benchmark benchmark-scenarios benchmark-solvers benchmark-laws benchmark-metrics benchmark-peers mutation constraints

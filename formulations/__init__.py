@@ -1,6 +1,7 @@
 """The formulations, one per file: (problem, solve) -> velocity.
 
-A new formulation is a file in this package and a line in this table.
+A new formulation is a file in this package and a line in this table. Other libraries as
+formulations are the table `PEERS` of `formulations.peers`.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from formulations.neo import Neo
 from formulations.nullspace import Nullspace
 from formulations.nullspace_robust import NullspaceRobust
 from formulations.nullspace_unprojected import NullspaceUnprojected
+from formulations.peers import PEERS
 from formulations.pink_qp import PinkQp
 from formulations.pseudo_inverse import PseudoInverse
 from formulations.qp_velocity import QpVelocity
@@ -39,6 +41,8 @@ from formulations.truncated_svd import TruncatedSvd
 from formulations.variable_damping import VariableDamping
 from formulations.weighted_least_norm import WeightedLeastNorm
 from formulations.weighted_qp import WeightedQp
+
+__all__ = ["FORMULATIONS", "PEERS"]
 
 FORMULATIONS: Mapping[str, type[Formulation]] = MappingProxyType(
     {

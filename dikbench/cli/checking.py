@@ -90,19 +90,23 @@ def _of_plugin(name: str, solver: str | None) -> Iterator[Line]:
     """Yield a line for each check of a plug-in's contract."""
     from dikbench.errors import DikbenchError, unknown
     from dikbench.plugins.building import make_family, make_formulation
-    from dikbench.plugins.finding import in_file, kind_in_file, plugins
+    from dikbench.plugins.finding import formulations_and_peers, in_file, kind_in_file, plugins
+    from dikbench.problem.problem import not_installed
     from dikbench.selector import parse_selector
     from dikbench.testing.verdicts import verdicts_on_family, verdicts_on_formulation
 
     plugin = parse_selector(name).name
     known = {plugin: kind_in_file(plugin)} if in_file(plugin) else {}
-    known |= dict.fromkeys(plugins("formulation"), "formulation")
+    known |= dict.fromkeys(formulations_and_peers(), "formulation")
     known |= dict.fromkeys(plugins("scenario"), "scenario")
     if plugin not in known:
         where = "(or give path/to/file.py:Class)"
         raise unknown("formulation or scenario", plugin, known, where, "dikbench list")
     if known[plugin] == "formulation":
-        verdicts = verdicts_on_formulation(make_formulation(name), solver)
+        formulation = make_formulation(name)
+        if missing := not_installed(formulation):
+            raise DikbenchError(f"formulation {name}: {missing}")
+        verdicts = verdicts_on_formulation(formulation, solver)
     elif solver is not None:
         raise DikbenchError(f"--solver {solver}: {name} is a scenario family, which needs none")
     else:

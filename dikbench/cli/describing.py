@@ -18,6 +18,7 @@ from dikbench.plugins.building import make_formulation, make_plant, make_scenari
 from dikbench.plugins.finding import (
     Plugin,
     formulation_plugin,
+    formulations_and_peers,
     in_file,
     kind_in_file,
     plugins,
@@ -59,7 +60,7 @@ def description(text: str) -> str:
     selector = parse_selector(text)
     name = selector.name
     kind = kind_in_file(name) if in_file(name) else None
-    if kind == "formulation" or name in plugins("formulation"):
+    if kind == "formulation" or name in formulations_and_peers():
         return _described(formulation_plugin(name), selector)
     if kind == "scenario" or name in plugins("scenario"):
         return _described(scenario_plugin(name), selector, scenario=True)
@@ -113,7 +114,14 @@ def _without_parameters(name: str) -> str:
         study = load_study(name)
         path = shipped_studies().get(name, name)
         return f"# {study.name} ({path})\n\n{Path(path).read_text(encoding='utf-8')}"
-    every = [*plugins("formulation"), *plugins("scenario"), *BACK_ENDS, *PLANTS, *ROBOTS, *METRICS]
+    every = [
+        *formulations_and_peers(),
+        *plugins("scenario"),
+        *BACK_ENDS,
+        *PLANTS,
+        *ROBOTS,
+        *METRICS,
+    ]
     raise unknown("name", name, [*every, *shipped_studies()], every="dikbench list")
 
 

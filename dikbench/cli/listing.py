@@ -9,6 +9,7 @@ from typing import Final
 
 from dikbench.metrics import METRICS, OUTCOME_SENTENCES, Metric
 from dikbench.plugins.finding import Plugin, plugins
+from dikbench.problem.problem import not_installed
 from dikbench.robots.catalogue import ROBOTS
 from dikbench.scenario.oracle import ORACLE, SLOWED_ORACLE
 from dikbench.scenario.plant import PLANTS
@@ -49,6 +50,10 @@ def _formulations() -> list[tuple[str, str, str]]:
             for formulation in formulations
         ),
         *((name, summary, "") for name, summary in ORACLE_SUMMARIES.items()),
+        *(
+            (peer.name, peer.summary.rstrip("."), not_installed(peer.factory) or peer.source)
+            for peer in plugins("peer").values()
+        ),
     ]
 
 

@@ -2,7 +2,9 @@
 
 An entry point in the group `dikbench.formulations` or `dikbench.scenarios` names a module that
 has a table `FORMULATIONS` or `SCENARIOS`: name -> class, an instance of a class (whose values
-are then the defaults), or a `functools.partial` of one.
+are then the defaults), or a `functools.partial` of one. A module of formulations may have a table
+`PEERS` as well, of other libraries as formulations: they are found by name, and are not among "all
+formulations", which do not depend on what is installed.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ from dikbench.parameters import Parameter, parameters_of
 from dikbench.scenario.family import Family
 
 Kind = Literal["formulation", "scenario"]
+Table = Literal["formulation", "scenario", "peer"]
 
 
 @dataclass(frozen=True)
@@ -66,15 +69,20 @@ class Plugin:
         }
 
 
+def formulations_and_peers() -> Mapping[str, Plugin]:
+    """Find every registered formulation and every peer, by name."""
+    return {**plugins("formulation"), **plugins("peer")}
+
+
 @lru_cache
-def plugins(kind: Kind) -> Mapping[str, Plugin]:
-    """Find every registered plug-in of a kind, by name.
+def plugins(kind: Table) -> Mapping[str, Plugin]:
+    """Find every registered plug-in of a table, by name.
 
     Raises:
         DikbenchError: if there is none (dikbench is not installed), a module has no table, an entry
             is not a plug-in, or two have the same name.
     """
-    group = f"dikbench.{kind}s"
+    group = f"dikbench.{'formulation' if kind == 'peer' else kind}s"
     found: dict[str, Plugin] = {}
     for entry_point in importlib.metadata.entry_points(group=group):
         where = f"plug-in {entry_point.name!r} of {group}"
@@ -85,7 +93,7 @@ def plugins(kind: Kind) -> Mapping[str, Plugin]:
                 f"{where} ({entry_point.value}) cannot be imported: {in_words(error)}"
             ) from error
         file = getattr(module, "__file__", None) or repr(module)
-        table = getattr(module, f"{kind.upper()}S", None)
+        table = getattr(module, f"{kind.upper()}S", {} if kind == "peer" else None)
         if not isinstance(table, Mapping):
             top = entry_point.value.partition(".")[0]
             raise DikbenchError(
@@ -93,12 +101,14 @@ def plugins(kind: Kind) -> Mapping[str, Plugin]:
                 f"folder or module {top!r} of yours hides it: valid: another name"
             )
         for name, entry in table.items():
-            plugin = _registered(kind, name, entry, file)
+            plugin = _registered(
+                "scenario" if kind == "scenario" else "formulation", name, entry, file
+            )
             if found.setdefault(plugin.name, plugin) != plugin:
                 raise DikbenchError(
                     f"two plug-ins are called {name!r}: {found[name].file} and {plugin.file}"
                 )
-    if not found:
+    if not found and kind != "peer":
         raise DikbenchError(
             f"no {kind}s are registered: dikbench is not installed here; "
             "run pip install -e . in its checkout"
@@ -170,7 +180,7 @@ def _plugin(kind: Kind, name: str) -> Plugin:
             return plugin
         # Another file of this name, in another folder, may have taken the module's place.
         return replace(plugin, file=os.path.abspath(path))
-    known = plugins(kind)
+    known = plugins(kind) if kind == "scenario" else formulations_and_peers()
     if name not in known:
         where = "(or give path/to/file.py:Class)"
         raise unknown(kind, name, known, where, f"dikbench list {kind}s")

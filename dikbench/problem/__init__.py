@@ -56,6 +56,7 @@ from dikbench.problem.tasks import (
     TrackingTogether,
 )
 from dikbench.problem.tasks.orientation import LinearizedOrientation
+from dikbench.problem.tasks.pose import LinearizedPose
 from dikbench.problem.tasks.task import LinearizedJointTask, LinearizedTask
 from dikbench.problem.velocity_box import Box, Braking
 from dikbench.programs.modelled_program import ModelledProgram
@@ -83,6 +84,7 @@ __all__ = [
     "Limits",
     "LinearizedJointTask",
     "LinearizedOrientation",
+    "LinearizedPose",
     "LinearizedTask",
     "Mask",
     "ModelledProgram",

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from importlib.util import find_spec
 from itertools import groupby
 from operator import attrgetter
 from typing import Final, Literal, Protocol, runtime_checkable
@@ -119,8 +120,14 @@ class Formulation(Protocol):
     of program it has solved; default: none), `keeps` (the limits it promises to keep; default:
     none) and `sees` (the parts of a problem that it takes into account, see `ProblemPart`; default:
     none but what it keeps). A method `refuses(problem)` says why it cannot answer problems of this
-    kind, and returns an empty text where it can. A paragraph `Source: ...` in its docstring names
-    the paper. The same problem gives the same velocity.
+    kind, and returns an empty text where it can. A mapping `requires` says which modules it imports
+    that do not come with dikbench, and the command that installs each. A paragraph `Source: ...` in
+    its docstring names the paper. The same problem gives the same velocity.
+
+    A peer, another library as a formulation, says with `computes_kinematics = True` that its call
+    is a whole tick, with `counterpart` which formulation (a selector) is to answer alike, with
+    `known_difference(problem, velocity)` why it did not here (an empty text: no reason is known;
+    the velocity is None where it has none), and with `package` which distribution it is.
 
     With `batched = True` it says that `velocity` also answers N control steps at once (see
     `DikProblem`), (N, nv), each as if it were alone: matrices with the functions of
@@ -146,6 +153,20 @@ def program_of(formulation: Formulation) -> ProgramKind | None:
 def promises_of(formulation: Formulation) -> frozenset[LimitKind]:
     """Return the kinds of limits that the formulation promises to keep."""
     return frozenset(getattr(formulation, "keeps", ()))
+
+
+def computes_kinematics(formulation: Formulation) -> bool:
+    """Whether the formulation computes kinematics of its own, as part of its call."""
+    return bool(getattr(formulation, "computes_kinematics", False))
+
+
+def not_installed(formulation: Formulation | type) -> str:
+    """Which module that a formulation requires is not installed here; empty where none is."""
+    requires: Mapping[str, str] = getattr(formulation, "requires", {})
+    for module, command in requires.items():
+        if find_spec(module) is None:
+            return f"{module} is not installed: {command}"
+    return ""
 
 
 def is_batched(formulation: Formulation) -> bool:
@@ -175,8 +196,11 @@ def sight_of(formulation: Formulation) -> frozenset[ProblemPart]:
 def refusal_of(formulation: Formulation, problem: DikProblem) -> str:
     """Why the formulation cannot answer problems of this kind; empty where it can.
 
-    It is its own reason, or that it does not look at the rows G v <= h of the problem.
+    It is its own reason, that something is not installed, or that it does not look at the rows
+    G v <= h of the problem.
     """
+    if missing := not_installed(formulation):
+        return missing
     if sees_constraints(formulation, problem) is False:
         return (
             "does not look at constraints (rows G v <= h, of distances and torques); leave them "

@@ -16,9 +16,11 @@ from dikbench.report.tables.files import write_table
 from dikbench.report.tables.instances import write_instances
 from dikbench.report.tables.kinds import TIMING
 from dikbench.report.tables.markdown import markdown_rows
+from dikbench.report.tables.peers import write_peers_tables
 from dikbench.report.tables.return_codes import TITLE as RETURN_CODES
 from dikbench.results.folder import ResultsFolder
 from dikbench.results.instances import read_attempts
+from dikbench.results.peers import read_peers
 from dikbench.results.reading import read_results, without_attributes
 from dikbench.results.selected import with_selected
 from dikbench.statistics.stability import STABLE
@@ -38,6 +40,7 @@ def write_report(path: Path) -> str:
         contents = gather(results, draw_figures(results.folder, results.trials, results.manifest))
         codes = _write_tables(path, contents)
         write_instances(read_attempts(path), path / "tables")
+        write_peers_tables(read_peers(path), path / "tables")
         page = render_html(contents, path / "figures", embed(results.trials))
         (path / "report.html").write_text(page, encoding="utf-8")
         (path / "report.md").write_text(render_markdown(contents), encoding="utf-8")
@@ -46,6 +49,8 @@ def write_report(path: Path) -> str:
         raise DikbenchError(f"report in {path} cannot be written: {reason}") from None
     counts = ", ".join(f"{number} {what}" for number, what in contents.counts)
     printed = [*map(to_text, contents.tables), f"{RETURN_CODES}\n\n{codes}\n", f"{counts}.\n"]
+    if len(contents.peers):
+        printed.append(f"{contents.peers_note}\n\n{markdown_rows(contents.peers)}\n")
     for limitation in contents.limitations:
         printed += [f"- {limitation.text}", *(f"  - {case}" for case in limitation.cases)]
     return "\n".join(printed)

@@ -12,6 +12,7 @@ import msgspec
 
 from dikbench.errors import DikbenchError, unknown
 from dikbench.results.folder import ResultsFolder
+from dikbench.results.peers import write_peers
 from dikbench.results.store import Store
 from dikbench.run.blocks import (
     engine_of,
@@ -19,6 +20,7 @@ from dikbench.run.blocks import (
 from dikbench.run.folder_of_instances import instances_in
 from dikbench.run.folder_of_study import store_for
 from dikbench.run.in_workers import RunSettings, run_trials
+from dikbench.run.peers import compare_with_peers, pairs_of, with_ticks
 from dikbench.run.pool import THREAD_VARIABLES, workers
 from dikbench.run.progress_display import ProgressDisplay
 from dikbench.run.provenance import environment, git_commit, manifest
@@ -100,7 +102,7 @@ def run_study(study: Study, out: Path, settings: RunSettings, command: str) -> R
                     display.advance(len(rows))
             if study.timing is not None:
                 known = set() if settings.rerun == "all" else store.timed() - outdated
-                _time(store, run, study, planned, known, worker)
+                _time(folder, store, run, study, planned, known, worker)
         except KeyboardInterrupt:
             finished = sum(p.id in store.statuses() for p in planned)
             folder.export(store)
@@ -130,7 +132,7 @@ def time_study(study: Study, out: Path, command: str) -> ResultsFolder:
         described = environment(git_commit(), command)
         run = store.begin_run(manifest(study, len(planned), described), planned)
         try:
-            _time(store, run, study, planned, set(), described)
+            _time(folder, store, run, study, planned, set(), described)
         except KeyboardInterrupt:
             raise Interrupted(f"{len(store.timed())} cells are timed and kept") from None
         folder.export(store)
@@ -159,6 +161,7 @@ def _again(planned: PlannedTrial, status: str, rerun: str) -> bool:
 
 
 def _time(
+    folder: ResultsFolder,
     store: Store,
     run: int,
     study: Study,
@@ -166,9 +169,10 @@ def _time(
     known: set[str],
     described: TrialRow,
 ) -> None:
-    """Run the timing pass in one process of its own while no trial runs.
+    """Run the timing pass in one process of its own while no trial runs, and ask peers there.
 
     Args:
+        folder: where comparisons with peers are kept.
         store: where times are committed.
         run: number of the run.
         study: whose cells are timed.
@@ -201,6 +205,7 @@ def _time(
     if not scenarios:
         return
     arguments = (cells, timing.reference, timing.problems, timing.rounds)
+    pairs = pairs_of(cells)
     made = store.environment(described)
     with (
         workers(1, (time_scenario.__module__,)) as pool,
@@ -212,6 +217,14 @@ def _time(
             )
             for scenario in scenarios
         }
+        compared = {
+            scenario: pool.schedule(
+                compare_with_peers,
+                args=(scenario, study.seeds[0], pairs),
+                timeout=TIMING_TIMEOUT_S,
+            )
+            for scenario in (scenarios if pairs else ())
+        }
         for scenario, future in futures.items():
             rows: list[TrialRow] = []
             try:
@@ -222,6 +235,12 @@ def _time(
             for cell, row in zip(cells, rows, strict=False):
                 named = {"id": timing_id(*cell, scenario), "environment": made}
                 store.record_times({**row, **named}, run)
+            if scenario in compared:
+                try:
+                    write_peers(folder.path, with_ticks(compared[scenario].result(), rows))
+                except Exception as error:  # as above
+                    reason = f"{type(error).__name__}: {error}".partition("\n")[0]
+                    print(f"no comparison with peers for {scenario}: {reason}", file=sys.stderr)
             display.advance()
 
 

@@ -16,7 +16,13 @@ import numpy as np
 from dikbench.arrays import Array
 from dikbench.plugins.building import make_formulation
 from dikbench.problem.posing import pose_problem
-from dikbench.problem.problem import DikProblem, Formulation, Solve, refusal_of
+from dikbench.problem.problem import (
+    DikProblem,
+    Formulation,
+    Solve,
+    computes_kinematics,
+    refusal_of,
+)
 from dikbench.results.columns import CONTROL_RATES_HZ
 from dikbench.robots.kinematics import Kinematics
 from dikbench.run.trial_row import TrialRow, scenario_of, solve_of
@@ -40,21 +46,30 @@ TIME_PARTS: Final = ("whole", "own", "core", "wrapper")
 
 @dataclass(frozen=True)
 class _Recording:
-    """A formulation that records the problems of another one."""
+    """A formulation that records what another one is asked and answers."""
 
     formulation: Formulation
-    problems: list[DikProblem]
+    asked: list[tuple[DikProblem, Array | None]]
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
-        self.problems.append(problem)
-        return self.formulation.velocity(problem, solve)
+        self.asked.append((problem, None))
+        v = self.formulation.velocity(problem, solve)
+        self.asked[-1] = problem, v
+        return v
+
+
+def record_run(
+    scenario: Scenario, formulation: Formulation, solve: CheckedSolve
+) -> list[tuple[DikProblem, Array | None]]:
+    """Record each problem of a run of a formulation with its answer, None where it has none."""
+    recording = _Recording(formulation, [])
+    simulate(scenario, recording, solve, Ideal())
+    return recording.asked
 
 
 def record_problems(scenario: Scenario, formulation: Formulation, count: int) -> list[DikProblem]:
     """Record contiguous problems from the middle of a run of a formulation without solver."""
-    recording = _Recording(formulation, [])
-    simulate(scenario, recording, make_solve(None, None), Ideal())
-    problems = recording.problems
+    problems = [asked for asked, _ in record_run(scenario, formulation, make_solve(None, None))]
     first = max(0, (len(problems) - count) // 2)
     return problems[first : first + count]
 
@@ -70,7 +85,9 @@ def time_scenario(
     """Time every cell on one scenario's problems.
 
     In every round each cell solves the whole segment, in a new random order of the cells, so that
-    drift of the machine affects all equally. A sample is one call of the formulation.
+    drift of the machine affects all equally. A sample is one call of the formulation. Kinematics
+    and tasks are timed apart, for all but formulations that compute their own: a whole tick is the
+    sum of both.
 
     Args:
         selector: the scenario.
@@ -106,9 +123,9 @@ def time_scenario(
             "formulation": str(formulation),
             "solver": str(solver),
             "scenario": str(selector),
-            **_summary(samples[index], kinematics),
+            **_summary(samples[index], 0 * kinematics if computes_kinematics(law) else kinematics),
         }
-        for index, (formulation, solver) in enumerate(cells)
+        for index, ((formulation, solver), (law, _)) in enumerate(zip(cells, timed, strict=True))
     ]
 
 

@@ -51,6 +51,11 @@ class Asked:
             if reason:
                 raise DikbenchError(reason)
 
+    def states(self) -> Iterator[State]:
+        """Yield the states of the contract whose problems the formulation does not refuse."""
+        refuses = getattr(self.formulation, "refuses", None)
+        return (s for s in states() if refuses is None or not refuses(s.problem))
+
     def answer(self, problem: DikProblem) -> Answer:
         """Ask the formulation, with a solver that remembers nothing, and recheck the solver."""
         given, solve = self._ask(problem)
@@ -78,7 +83,7 @@ class Asked:
     @cached_property
     def answers(self) -> list[tuple[State, Answer]]:
         """Ask at every state of the contract, in order."""
-        return [(state, self.answer(state.problem)) for state in states()]
+        return [(state, self.answer(state.problem)) for state in self.states()]
 
     def verified(self) -> Iterator[tuple[State, Array, float]]:
         """Yield every state with a verified answer: state, velocity, tolerance [rad/s].

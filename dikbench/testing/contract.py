@@ -36,7 +36,7 @@ from dikbench.simulation.status import Status
 from dikbench.testing.asked import LIMIT_TOLERANCE_RAD_S, Asked, asked_of
 from dikbench.testing.rows import check_rows
 from dikbench.testing.sight import check_sight
-from dikbench.testing.states import State, states
+from dikbench.testing.states import State
 
 Check = Callable[[Formulation | Asked, str | None], None]
 
@@ -94,7 +94,7 @@ def check_finite(formulation: Formulation | Asked, solver: str | None = None) ->
 def check_inputs_untouched(formulation: Formulation | Asked, solver: str | None = None) -> None:
     """Check that the formulation leaves everything that it was handed as it was."""
     asked = asked_of(formulation, solver)
-    for state in states():
+    for state in asked.states():
         before = {name: np.array(value) for name, value in _inputs(state.problem).items()}
         asked.velocity(state.problem)
         after = _inputs(state.problem)
@@ -149,7 +149,7 @@ def check_picklable(formulation: Formulation | Asked, solver: str | None = None)
 
 def _compare(first: Asked, second: Asked, what: str) -> None:
     """Ask one forwards through the states, the other backwards, with other scratch data."""
-    for state, (_, answer) in reversed([*zip(states(), first.answers, strict=True)]):
+    for state, (_, answer) in reversed([*zip(first.states(), first.answers, strict=True)]):
         v = answer.velocity
         robot = state.problem.robot
         pin.computeJointJacobians(robot.model, robot.scratch, robot.q0)

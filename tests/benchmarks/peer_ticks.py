@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from dikbench.robots.example_robot_data import _data_folder
 from dikbench.scenario import Scenario
+from formulations.peers.models import TOOL, position_limits, urdf_of
 
 Tick = Callable[[], int]
 
@@ -68,8 +67,8 @@ def mink_tick(scenario: Scenario) -> Tick:
     import mujoco
 
     robot, dt = scenario.robot, scenario.dt
-    model = mujoco.MjModel.from_xml_string(bare_urdf("panda_description/urdf/panda.urdf"))
-    frame = mink.FrameTask(robot.frame, "body", 1.0, 1.0, gain=scenario.tracking.gain * dt)
+    model = mujoco.MjModel.from_xml_string(urdf_of(robot, position_limits(robot)))
+    frame = mink.FrameTask(TOOL, "body", 1.0, 1.0, gain=scenario.tracking.gain * dt)
     posture = mink.PostureTask(model, POSTURE_COST, gain=dt)
     names = [robot.model.names[joint] for joint in range(1, robot.model.njoints)]
     assert robot.limits.velocity is not None
@@ -87,27 +86,6 @@ def mink_tick(scenario: Scenario) -> Tick:
         return scenario.steps
 
     return run
-
-
-def bare_urdf(path: str) -> str:
-    """A URDF of example-robot-data without meshes, fingers locked, for MuJoCo's reader."""
-    robot = ET.parse(_data_folder() / path).getroot()
-    for link in robot.iter("link"):
-        for part in [*link.findall("visual"), *link.findall("collision")]:
-            link.remove(part)
-        if link.find("inertial") is None:
-            inertial = ET.SubElement(link, "inertial")
-            ET.SubElement(inertial, "mass", value="0.1")
-            moments = {"ixx": "1e-3", "iyy": "1e-3", "izz": "1e-3"}
-            ET.SubElement(inertial, "inertia", moments | {"ixy": "0", "ixz": "0", "iyz": "0"})
-    for joint in robot.iter("joint"):
-        if "finger" in joint.get("name", ""):
-            joint.set("type", "fixed")
-            for part in [*joint.findall("mimic"), *joint.findall("limit")]:
-                joint.remove(part)
-    compiler = ET.SubElement(robot, "mujoco")
-    ET.SubElement(compiler, "compiler", fusestatic="false")
-    return ET.tostring(robot, encoding="unicode")
 
 
 def drake_tick(scenario: Scenario) -> Tick:

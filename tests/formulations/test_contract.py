@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import pickle
 import typing
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache, lru_cache
-from importlib import import_module
+from functools import lru_cache
 from typing import ClassVar, Literal
 
 import numpy as np
 import pytest
+from makers.few_states import few_states
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError, Infeasible
@@ -30,7 +28,6 @@ from dikbench.testing import (
     check_repeatable,
     check_sight,
 )
-from dikbench.testing.states import states
 
 LAWS = sorted(plugins("formulation"))
 
@@ -76,27 +73,6 @@ def test_registered_law_keeps_every_clause_at_every_state(name: str) -> None:
 
 ASK_AGAIN = (check_sight, check_inputs_untouched, check_repeatable, check_picklable)
 """Checks that ask a law again at its states; the others share one answer at each."""
-
-STRIDE = 7
-"""One state in so many is asked in the normal run. No period of the states divides it: all
-speeds, limits, rows and motions before come up."""
-
-
-@cache
-def pickled_states() -> list[bytes]:
-    """Make every state once: to copy some of them takes less than to make them all."""
-    return [pickle.dumps(state) for state in states()]
-
-
-@contextmanager
-def few_states(turn: int) -> Iterator[None]:
-    """Have the contract ask at one state in so many meanwhile, the first of them in turns."""
-    few = pickled_states()[turn % STRIDE :: STRIDE]
-    with pytest.MonkeyPatch.context() as patch:
-        for name in ("asked", "contract", "sight"):
-            module = import_module(f"dikbench.testing.{name}")
-            patch.setattr(module, "states", lambda: map(pickle.loads, few))
-        yield
 
 
 @pytest.mark.parametrize(("turn", "selector"), [*enumerate(variants(every=False))])

@@ -8,12 +8,11 @@ from pathlib import Path
 import formulations
 from dikbench.cli.listing import listing
 from dikbench.metrics import METRICS
-from dikbench.plugins.finding import plugins
-from formulations import FORMULATIONS
+from dikbench.plugins.finding import formulations_and_peers
 
 FOLDER = Path(formulations.__file__).parent
 KEY = re.compile(r"\[([A-Z]\w+)\]")
-SOURCES = {name: plugins("formulation")[name].source for name in FORMULATIONS}
+SOURCES = {name: plugin.source for name, plugin in formulations_and_peers().items()}
 ENTRIES = re.findall(r"^- \*\*\[(\w+)\]\*\*", (FOLDER / "REFERENCES.md").read_text(), re.MULTILINE)
 
 

@@ -22,9 +22,11 @@ from dikbench.report.sentences.summary import Summary, summarise
 from dikbench.report.tables.every import make_tables
 from dikbench.report.tables.failures import Failures, failures
 from dikbench.report.tables.instances import in_a_sentence, instances_table
+from dikbench.report.tables.peers import NOTE, peers_table
 from dikbench.report.tables.return_codes import return_codes
 from dikbench.report.tables.table import Table
 from dikbench.results.instances import read_attempts
+from dikbench.results.peers import read_peers
 from dikbench.results.reading import Results
 from dikbench.statistics.failures import SKIPPED, has_failed, ran
 from dikbench.statistics.trial_matrix import CONTENDER
@@ -40,6 +42,7 @@ class Contents:
         tables: success, outcomes, tracking error, limit violation, timing, solvers.
         failures: the worst failed trials.
         return_codes: a row per solver.
+        peers: a row per peer, where peers were compared with.
         families: the scenario families of the run.
         formulations: its formulations.
         limitations: what to keep in mind.
@@ -51,10 +54,16 @@ class Contents:
     tables: Sequence[Table]
     failures: Failures
     return_codes: pd.DataFrame
+    peers: pd.DataFrame
     families: Sequence[Family]
     formulations: Sequence[FormulationOfRun]
     limitations: Sequence[Limitation]
     figures: Sequence[Figure]
+
+    @property
+    def peers_note(self) -> str:
+        """How peers were compared with."""
+        return NOTE
 
     @property
     def manifest(self) -> Mapping[str, Any]:
@@ -159,6 +168,7 @@ def gather(results: Results, figures: Sequence[Figure]) -> Contents:
         make_tables(trials),
         failures(trials),
         return_codes(trials),
+        peers_table(read_peers(results.folder.path)),
         families_of(trials),
         formulations_of(trials),
         [*limitations(trials, results.manifest, results.notes), *_rejections(results)],

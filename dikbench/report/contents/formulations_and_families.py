@@ -11,7 +11,7 @@ from typing import Final
 import pandas as pd
 
 from dikbench.plugins.built_scenarios import built
-from dikbench.plugins.finding import in_file, plugins
+from dikbench.plugins.finding import formulations_and_peers, in_file, plugins
 from dikbench.report.contents.bibliography import references
 from dikbench.report.contents.docstring import Docstring, parse_docstring
 from dikbench.results.columns import SELECTORS
@@ -133,7 +133,7 @@ def _described(name: str) -> tuple[str | None, dict[str, str], Path | None]:
         return f"{what}{slowed}, scored like a formulation.", {}, None
     if in_file(name):
         return *_read(name), None
-    plugin = plugins("formulation").get(name)
+    plugin = formulations_and_peers().get(name)
     if plugin is None:
         return None, {}, None
     defaults = {

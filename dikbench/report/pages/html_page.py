@@ -24,11 +24,17 @@ from dikbench.report.tables.table import Column, TableCell, shown
 from dikbench.viewer.static_scene import replay_script
 
 PLAYED: Final = ("play", "Matrix")
-SECTIONS: Final = (
+"""The section that is played."""
+
+PEERS: Final[str] = "peers"
+"""The section that only runs with peers have."""
+
+SECTIONS: Final[tuple[tuple[str, str], ...]] = (
     ("summary", "Summary"),
     ("tables", "Tables"),
     ("failures", "Failures"),
     ("return-codes", "Return codes"),
+    (PEERS, "Other libraries"),
     ("figures", "Figures"),
     ("families", "Families"),
     ("formulations", "Formulations"),
@@ -96,9 +102,10 @@ def render_html(contents: Contents, figures: Path, embedded: Embedded | None) ->
         "capitalize_first": lambda text: text[:1].upper() + text[1:],
     }
     template = environment.get_template("page.html.j2")
+    sections = [each for each in SECTIONS if each[0] != PEERS or len(contents.peers)]
     given = {
         "contents": contents,
-        "sections": SECTIONS if embedded is None else (PLAYED, *SECTIONS),
+        "sections": sections if embedded is None else [PLAYED, *sections],
         "assets": _assets(),
         "charts": None if embedded is None else embedded.charts,
         "rule": RULE,

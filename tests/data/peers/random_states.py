@@ -8,8 +8,6 @@ The same states in every run; what the arrays hold is said in the README beside 
 
 from __future__ import annotations
 
-import sys
-import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import Any
 
@@ -36,22 +34,15 @@ from pydrake.systems.framework import BusValue
 from dikbench import Robot, load_robot
 from dikbench.arrays import Array
 from dikbench.robots.kinematics import Kinematics
+from formulations.peers.models import TOOL, position_limits, urdf_of
 
 HERE = Path(__file__).parent
-sys.path.append(str(HERE.parents[1] / "benchmarks"))
-from peer_ticks import bare_urdf  # noqa: E402
-
 DT = 0.01
 STATES = 110
 """Of each arm."""
 GAINS = (0, 1, 10)
 POSTURE_COST = 1e-2
-URDFS = {
-    "panda": "panda_description/urdf/panda.urdf",
-    "ur5": "ur_description/urdf/ur5_robot.urdf",
-    "ur10": "ur_description/urdf/ur10_robot.urdf",
-    "xarm7": "xarm_description/urdf/xarm7.urdf",
-}
+ARMS = ("panda", "ur5", "ur10", "xarm7")
 
 
 def states(robot: Robot, random: np.random.Generator) -> tuple[Array, Array, Array]:
@@ -118,13 +109,10 @@ class DrakeFunction:
 class DrakeSystem:
     """Drake's system of least squares (weight 100), joint centring (gain 1), velocity limits."""
 
-    def __init__(self, name: str, robot: Robot) -> None:
+    def __init__(self, robot: Robot) -> None:
         builder = RobotDiagramBuilder()
-        urdf, plant = bare_urdf(URDFS[name]), builder.plant()
+        urdf = urdf_of(robot, position_limits(robot))
         (instance,) = builder.parser().AddModelsFromString(urdf, "urdf")
-        root = _root_link(urdf)
-        if root != "world":  # which Drake takes for the world itself
-            plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(root))
         checker = SceneGraphCollisionChecker(
             model=builder.Build(), robot_model_instances=[instance], edge_step_size=0.1
         )
@@ -141,7 +129,7 @@ class DrakeSystem:
             )
         )
         name = checker.plant().GetModelInstanceName(instance)
-        self.frame = f"{name}::{robot.frame}"
+        self.frame = f"{name}::{TOOL}"
         far = SpatialVelocity(np.full(3, 1e3), np.full(3, 1e3))
         every = DofMask(robot.nv, True)
         self.system = kind(recipe, "world", checker, every, DT, 1.0, far)
@@ -159,14 +147,6 @@ class DrakeSystem:
             self.system.GetInputPort(port).FixValue(self.context, value)
         v: Array = self.system.GetOutputPort("commanded_velocity").Eval(self.context)
         return v
-
-
-def _root_link(urdf: str) -> str:
-    """The link that is nobody's child."""
-    robot = ET.fromstring(urdf)
-    children = {child.get("link") for child in robot.iterfind("./joint/child")}
-    (root,) = {link.get("name", "") for link in robot.findall("link")} - children
-    return root
 
 
 def bounds(G: Array, h: Array, n: int) -> tuple[Array, Array]:
@@ -230,9 +210,9 @@ def _record(program: Any, v: Array) -> dict[str, Array]:
 class Mink:
     """Likewise mink's."""
 
-    def __init__(self, name: str, robot: Robot) -> None:
+    def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        self.model = mujoco.MjModel.from_xml_string(bare_urdf(URDFS[name]))
+        self.model = mujoco.MjModel.from_xml_string(urdf_of(robot, position_limits(robot)))
         names = [robot.model.names[joint] for joint in range(1, robot.model.njoints)]
         assert robot.limits.velocity is not None
         fastest = dict(zip(names, robot.limits.velocity.upper.tolist(), strict=True))
@@ -244,7 +224,7 @@ class Mink:
     def answer(self, q: Array, target: Any) -> dict[str, Array]:
         """The program in Delta q, and the velocity."""
         configuration = mink.Configuration(self.model, q=q)
-        frame = mink.FrameTask(self.robot.frame, "body", 1.0, 1.0)
+        frame = mink.FrameTask(TOOL, "body", 1.0, 1.0)
         frame.set_target(mink.SE3.from_matrix(target.homogeneous))
         posture = mink.PostureTask(self.model, POSTURE_COST)
         posture.set_target(nominal(q))
@@ -257,17 +237,17 @@ def main() -> None:
     """Ask everyone and write the file."""
     random = np.random.default_rng(7)
     kept: dict[str, Any] = {}
-    for name in URDFS:
+    for name in ARMS:
         robot = load_robot(name)
         q, v, V = states(robot, random)
         kept |= {f"{name}/q": q, f"{name}/v_prev": v, f"{name}/V": V}
-        kinematics, system = Kinematics(robot), DrakeSystem(name, robot)
+        kinematics, system = Kinematics(robot), DrakeSystem(robot)
         function = {
             (gain, limited): DrakeFunction(robot, gain, acceleration=limited)
             for gain in GAINS
             for limited in (False, True)
         }
-        pinks, minks = Pink(robot), Mink(name, robot)
+        pinks, minks = Pink(robot), Mink(robot)
         rows: dict[str, list[Array]] = {}
         for state, before, twist in zip(q, v, V, strict=True):
             kinematics.update(state)

@@ -27,6 +27,7 @@ from dikbench.problem.problem import refusal_of, sees_constraints, sees_lower_ta
 from dikbench.run.trial_row import run_trial
 from dikbench.study.trial import Trial
 from dikbench.testing import check_declaration, check_sight, states
+from dikbench.testing.verdicts import verdicts_on_formulation
 
 
 @dataclass(frozen=True)
@@ -135,6 +136,27 @@ def test_a_trial_that_is_refused_is_skipped_with_the_reason() -> None:
     row = run_trial(Trial.of("lp-alpha-components", "humanoid", "daqp"))
     assert (row["status"], row["steps"]) == ("skipped", 0)
     assert "not of several tasks" in row["message"]
+
+
+@dataclass(frozen=True)
+class _ForSixRows:
+    """Refuses arms in the plane, of which it can make nothing; with `all`, every arm."""
+
+    all: bool = False
+
+    def refuses(self, problem: DikProblem) -> str:
+        return "six rows" * (self.all or len(problem.primary.V) < 6)
+
+    def velocity(self, problem: DikProblem, solve: Solve) -> Array:
+        v: Array = np.zeros(problem.robot.nv) + 0.0 * problem.primary.V[5]
+        return v
+
+
+def test_the_contract_does_not_ask_what_is_refused() -> None:
+    """A formulation is held to what it answers; one that refuses everything cannot be checked."""
+    assert {v.outcome for v in verdicts_on_formulation(_ForSixRows())} == {"kept", "not promised"}
+    verdicts = {v.check: v for v in verdicts_on_formulation(_ForSixRows(all=True))}
+    assert verdicts["raises only cannot answer"].outcome != "kept"
 
 
 def test_constraints_that_are_not_looked_at_are_refused() -> None:
