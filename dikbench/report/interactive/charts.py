@@ -41,7 +41,7 @@ def counted_rows(controls: Sequence[Control], place: str = "toNumber(tolerance)"
     """Take the rows that the controls leave, with their category and whether they succeed."""
     category = _AT.format(place=place, half=_HALF)
     return (
-        alt.Chart(alt.Data(name=ROWS))
+        alt.Chart(alt.NamedData(name=ROWS))
         .transform_filter(filter_of(controls))
         .transform_calculate(category=category)
         .transform_calculate(done="datum.category==0?1:0")
@@ -54,7 +54,7 @@ def weighted(rows: alt.Chart, *within: str) -> alt.Chart:
     It adds `w`, which sums to 1 for each law (and each value of `within`), as
     `statistics.success.hierarchical_weights` does.
     """
-    law = ["law", *within]
+    law: list[Any] = ["law", *within]
     return (
         rows.transform_joinaggregate(families="distinct(family)", groupby=law)
         .transform_joinaggregate(robots="distinct(robot)", groupby=[*law, "family"])
@@ -244,7 +244,7 @@ PALETTE: Final = (
 """Colours of `CATEGORIES`: told apart by the colour-blind too, side by side."""
 
 
-def _heading(texts: Sequence[tuple[str, float]], scale: alt.Scale) -> alt.Chart:
+def _heading(texts: Sequence[tuple[str, float]], scale: alt.Scale) -> Any:
     """Write headings above the rows, at their places."""
     data = alt.InlineData([{"text": text, "x": place} for text, place in texts])
     return (

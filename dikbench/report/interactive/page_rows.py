@@ -129,8 +129,8 @@ def _outcomes(rows: pd.DataFrame) -> list[str]:
     same where limits may be broken (obstacles may not).
     """
     places = {outcome: str(k) for k, c in enumerate(CATEGORIES) for outcome in c.outcomes}
-    found = []
-    for row in rows.to_dict("records"):
+    found, records = [], list[Any](rows.to_dict("records"))
+    for row in records:
         if row["outcome"] == Outcome.DOES_NOT_SEE:
             found.append(places[Outcome.DOES_NOT_SEE] * 2 * (1 + len(TOLERANCES_M)))
             continue

@@ -15,7 +15,7 @@ from dikbench.report.interactive.page_rows import TOLERANCES_M
 WIDTH_PX: Final = 340
 HEIGHT_PX: Final = 240
 
-_CASE: Final = ["scenario", "seed", "plant", "reference"]
+_CASE: Final[list[Any]] = ["scenario", "seed", "plant", "reference"]
 
 LEAST_RATE: Final = 0.3
 """Who succeeds less often has too few trials to be compared in what they cost."""
@@ -26,7 +26,7 @@ def _colours() -> Any:
     return alt.condition("datum.law==versus", alt.value(CHOSEN), alt.value(GOOD))
 
 
-def cost(controls: Sequence[Control]) -> alt.Chart:
+def cost(controls: Sequence[Control]) -> Any:
     """Draw distance from the path against slow-down: medians over the trials that succeed.
 
     Relative to a law, over the trials in which both succeed, as ratios.
@@ -77,9 +77,7 @@ def deadline(controls: Sequence[Control]) -> Any:
     return alt.layer(points, line).properties(name="deadlines")
 
 
-def _scatter(
-    found: alt.Chart, x: str, y: str, title: str, name: str, *, log_y: bool = True
-) -> alt.Chart:
+def _scatter(found: alt.Chart, x: str, y: str, title: str, name: str, *, log_y: bool = True) -> Any:
     """Draw a point for each law, named where there is room."""
     across = alt.X("x:Q", title=x, scale=alt.Scale(type="log", nice=False, padding=14))
     scale = alt.Scale(type="log", nice=False, padding=12) if log_y else alt.Scale(domain=[0, 1])
@@ -101,7 +99,7 @@ def _scatter(
 def profile(controls: Sequence[Control]) -> Any:
     """Draw success against the tolerance: a line for each law, that of `versus` set off."""
     millimetres = json.dumps([1e3 * tolerance for tolerance in TOLERANCES_M])
-    places = [f"at{k}" for k in range(1, 1 + len(TOLERANCES_M))]
+    places: list[Any] = [f"at{k}" for k in range(1, 1 + len(TOLERANCES_M))]
     rows = counted_rows(controls).transform_calculate(
         **{
             place: f"slice(datum.outcomes,{k}+(limits=='kept'?0:{len(places) + 1}),"
@@ -114,7 +112,7 @@ def profile(controls: Sequence[Control]) -> Any:
     )
     found = (
         by_scenario.transform_aggregate(
-            **{place: f"sum({place})" for place in places},  # type: ignore[arg-type]
+            **dict[Any, Any]({place: f"sum({place})" for place in places}),
             rate="max(rate)", n="count()", groupby=["law"],
         )
         .transform_window(dense="dense_rank()", sort=[alt.SortField("rate", "descending")])

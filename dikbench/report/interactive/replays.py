@@ -35,9 +35,10 @@ def make_replays(trials: pd.DataFrame, rows: pd.DataFrame) -> dict[str, Any]:
             surrounds the robot and the path of the target.
         robots: the scenes (see `static_scene`), and client, viser's; both empty without viser.
     """
-    seconds = trials.set_index("id")["control_time_s"].astype(float)
+    seconds = trials.drop_duplicates("id").set_index("id")["control_time_s"].astype(float)
     wanted = trials[trials["id"].isin(chosen_runs(rows, seconds))]
-    return describe(run_again(wanted.to_dict("records")), drawn=has_viser())
+    found: list[Any] = wanted.to_dict("records")
+    return describe(run_again(found), drawn=has_viser())
 
 
 def describe(runs: Iterable[RunAgain], *, drawn: bool) -> dict[str, Any]:

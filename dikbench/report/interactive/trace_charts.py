@@ -42,7 +42,7 @@ def trace_charts() -> dict[str, Any]:
 
 def _lines(name: str, title: str, limit: float | None) -> Any:
     first, last = name == SERIES[0][0], name == SERIES[-1][0]
-    data = alt.Chart(alt.Data(name="series"))
+    data = alt.Chart(alt.NamedData(name="series"))
     legend = alt.Legend(orient="top", title=None) if first else None
     lines = data.mark_line(strokeWidth=2).encode(
         alt.X("t:Q", title="time [s]" if last else None),

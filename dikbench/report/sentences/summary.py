@@ -92,7 +92,8 @@ def summarise(trials: pd.DataFrame) -> Summary:
     every = rows_of_all(of_setting)
     candidates = {setting: dependable(rows, every) for setting, rows in of_setting.items()}
     barred = {setting: held_back(rows, every) for setting, rows in of_setting.items()}
-    chapters, headlines = [], []
+    chapters: list[Chapter] = []
+    headlines: list[str] = []
     firsts: list[tuple[Setting, tuple[Contender, ...]]] = []
     for situation, definition in DEFINITIONS.items():
         findings: list[Finding] = []

@@ -14,15 +14,20 @@ import pytest
 from makers.browser import BROWSER, DRIVER, browser_with
 from makers.shared import made_once
 
-import dikbench
 from dikbench.metrics import Judgement, motion_of
+from dikbench.report.contents.contents import gather
 from dikbench.report.interactive.controls import controls
+from dikbench.report.interactive.embedded import embed
 from dikbench.report.interactive.page_rows import TOLERANCES_M, page_rows
+from dikbench.report.pages.html_page import render_html
 from dikbench.report.selection.categories import CATEGORIES
 from dikbench.results.reading import read_results, without_attributes
 from dikbench.robots.kinematics import Kinematics
+from dikbench.run.in_workers import RunSettings
+from dikbench.run.runner import run_study
 from dikbench.statistics.success import counted, rates, succeeded, with_facts
-from dikbench.viewer.recording import find_recording
+from dikbench.study.study import load_study
+from dikbench.viewer.recording import Recording, find_recording
 from dikbench.viewer.viser_client import has_viser
 
 pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
@@ -58,9 +63,13 @@ PLAYS: Final = (
 
 
 def ran(folder: Path) -> None:
-    """Run the study, with its report."""
+    """Run the study, and make its page without figures."""
     (folder / "played.toml").write_text(STUDY)
-    dikbench.run_study(folder / "played.toml", out=folder / "out", jobs=1)
+    settings = RunSettings(jobs=1)
+    run_study(load_study(str(folder / "played.toml")), folder / "out", settings, "a test")
+    results = without_attributes(read_results(folder / "out"))
+    page = render_html(gather(results, []), folder / "out", embed(results.trials))
+    (folder / "out" / "report.html").write_text(page, encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -235,10 +244,8 @@ def test_ranking_and_matrix_are_what_pandas_says(
         assert got[law][0] == pytest.approx(rate, abs=0.0501), law
         assert got[law][1] == number, law
     marks = shown_marks(page, "matrix")
-    shares = {
-        (law, situation, CATEGORIES[category].name): len(part)
-        for (law, situation, category), part in found.groupby(["law", "situation", "category"])
-    }
+    counts: dict[Any, int] = found.groupby(["law", "situation", "category"]).size().to_dict()
+    shares = {(law, where, CATEGORIES[each].name): n for (law, where, each), n in counts.items()}
     said = {
         (m["law"], m["situation"], m["outcome"]): int(m["trials"]) for m in marks if "share" in m
     }
@@ -265,14 +272,12 @@ def test_rates_are_those_of_the_tables(trials: pd.DataFrame, rows: pd.DataFrame)
 def test_outcomes_are_those_of_the_judgement(trials: pd.DataFrame, rows: pd.DataFrame) -> None:
     """At the scenario's own tolerance the stored outcome; success grows with the tolerance."""
     stored = trials.set_index("id")["outcome"]
-    for row in rows.itertuples():
-        assert stored[row.id] in CATEGORIES[int(row.outcomes[0])].outcomes
-        kept = [int(digit == "0") for digit in row.outcomes[1:7]]
+    for trial, outcomes in zip(rows["id"], rows["outcomes"], strict=True):
+        assert stored[trial] in CATEGORIES[int(outcomes[0])].outcomes
+        kept = [int(digit == "0") for digit in outcomes[1:7]]
         assert kept == sorted(kept)
-        assert all(
-            a <= b for a, b in zip(kept, (int(d == "0") for d in row.outcomes[8:]), strict=True)
-        )
-    one = trials[trials["id"].eq(rows["id"].iloc[0])].to_dict("records")[0]
+        assert all(a <= b for a, b in zip(kept, (int(d == "0") for d in outcomes[8:]), strict=True))
+    one: Any = trials[trials["id"].eq(rows["id"].iloc[0])].to_dict("records")[0]
     at_2_mm = Judgement.of_row(one).at(0.002).outcome
     assert at_2_mm in CATEGORIES[int(rows["outcomes"].iloc[0][2])].outcomes
 
@@ -280,14 +285,19 @@ def test_outcomes_are_those_of_the_judgement(trials: pd.DataFrame, rows: pd.Data
 def test_a_control_moved_by_hand_changes_every_view(page: Any, rows: pd.DataFrame) -> None:
     """Ranking, matrix, cost, profile: all of them follow; the address holds the state."""
     views = ("matrix", "cost", "profile", "deadline")
-    before = {view: shown_marks(page, view) for view in views}
+    before = {view: said_by(page, view) for view in views}
     choose(page, robot="panda")
     assert shown_ranking(page).keys() == expected(chosen(rows, robot="panda")).keys()
     for view in views:
-        assert shown_marks(page, view) != before[view], view
+        assert said_by(page, view) != before[view], view
     assert "robot=panda" in page.current_url
     reset(page)
-    assert shown_marks(page, "matrix") == before["matrix"]
+    assert said_by(page, "matrix") == before["matrix"]
+
+
+def said_by(page: Any, view: str) -> list[str]:
+    """What the marks of a view say, whatever their order."""
+    return sorted(map(str, shown_marks(page, view)))
 
 
 def test_costs_are_medians_of_the_successes(page: Any, rows: pd.DataFrame) -> None:
@@ -401,71 +411,56 @@ def opened_trial(page: Any) -> str:
 def test_a_bar_leads_to_its_trials_and_a_trial_to_its_run(
     page: Any, rows: pd.DataFrame, results: Path
 ) -> None:
-    """The list is of the bar's formulation, situation and outcome; the run is the one clicked."""
+    """The run is one of the bar's, told by its commands, certificate and time, and it moves."""
     first = shown_marks(page, "matrix")[0]
     trial = opened_trial(page)
     row = rows.set_index("id").loc[trial]
     assert (row["law"], row["situation"]) == (first["law"], first["situation"])
-    title = page.find_element("id", "run-title").text
+    title, commands = (page.find_element("id", name).text for name in ("run-title", "run-commands"))
     assert row["scenario"] in title
     assert row["law"] in title
-    commands = page.find_element("id", "run-commands").text
     assert f"dikbench replay {trial}" in commands
     assert f"--formulation '{row['formulation']}'" in commands
     assert f"trial={trial}" in page.current_url
-    certificate = find_recording(trial, results).scenario.certificate
+    recording = find_recording(trial, results)
     told = page.execute_script("return document.getElementById('run-certificate').textContent")
-    assert told.splitlines() == [str(claim) for claim in certificate.claims]
-
-
-def test_traces_are_those_of_the_run(page: Any, results: Path) -> None:
-    """Distance to the target and use of the speeds against time, at the instants shown."""
-    recording = find_recording(opened_trial(page), results)
-    motion = motion_of(recording.trace, recording.scenario)
-    points = page.execute_script(
-        "return document.querySelector('#traces .mark-line path').ariaLabel"
-        " ?? document.querySelector('#traces svg') !== null"
-    )
-    assert points
-    worst = int(np.argmax(motion.tracking_error))
+    claims = recording.scenario.certificate.claims
+    assert told.splitlines() == [str(claim) for claim in claims]
+    # It opens at its worst instant.
+    worst = int(np.argmax(motion_of(recording.trace, recording.scenario).tracking_error))
     clock = float(page.execute_script("return document.getElementById('clock').value").split()[0])
     assert clock == pytest.approx(worst * recording.trace.dt, abs=0.011 + recording.trace.dt)
+    if has_viser():
+        moves_as_the_trace_says(page, recording)
 
 
-@pytest.mark.skipif(
-    not has_viser(), reason="viser is not installed: pip install 'dikbench[replay]'"
-)
-def test_the_replay_moves_as_the_trace_says(page: Any, results: Path) -> None:
-    """At a time of the trace the tool stands where Pinocchio says; so it does beside another."""
-    recording = find_recording(opened_trial(page), results)
-    wait(
-        page,
-        "return document.querySelector('#replays iframe')?.contentWindow.__viserMutable != null",
-    )
+def moves_as_the_trace_says(page: Any, recording: Recording) -> None:
+    """Check that at a time of the trace the tool stands where Pinocchio says."""
+    ready = "document.querySelector('#replays iframe')?.contentWindow.__viserMutable"
+    wait(page, f"return Boolean({ready})")
     trace, robot = recording.trace, recording.scenario.robot
     kinematics = Kinematics(robot)
-    end = trace.steps * trace.dt
     for k in (0, trace.steps // 3, trace.steps):
-        tool = page.execute_async_script(
-            """
-            const [share, done] = arguments, slider = document.getElementById("instant");
-            slider.value = share;
-            slider.dispatchEvent(new Event("input"));
-            setTimeout(() => {
-              const frame = document.querySelector("#replays iframe");
-              const viser = frame.contentWindow.__viserMutable;
-              viser.scene.updateMatrixWorld(true);
-              const name = Object.keys(viser.nodeRefFromName).find((each) => each.endsWith("/tool"));
-              const base = viser.nodeRefFromName["/robot"].matrixWorld.clone().invert();
-              done(base.multiply(viser.nodeRefFromName[name].matrixWorld).elements);
-            }, 1500);
-            """,
-            k * trace.dt / end,
-        )
+        tool = page.execute_async_script(TOOL_AT, k / trace.steps)
         kinematics.update(trace.q[k])
         want = kinematics.placement(robot.frame_id).homogeneous
         # The slider has steps of a thousandth of the time, and joints are rounded to 1e-4 rad.
         assert np.array(tool).reshape(4, 4).T == pytest.approx(want, abs=3e-3)
+
+
+TOOL_AT: Final = """
+const [share, done] = arguments, slider = document.getElementById("instant");
+slider.value = share;
+slider.dispatchEvent(new Event("input"));
+setTimeout(() => {
+  const viser = document.querySelector("#replays iframe").contentWindow.__viserMutable;
+  viser.scene.updateMatrixWorld(true);
+  const name = Object.keys(viser.nodeRefFromName).find((each) => each.endsWith("/tool"));
+  const base = viser.nodeRefFromName["/robot"].matrixWorld.clone().invert();
+  done(base.multiply(viser.nodeRefFromName[name].matrixWorld).elements);
+}, 1500);
+"""
+"""Moves the slider to a share of the time, and gives the pose of the tool in the robot's base."""
 
 
 def test_a_link_restores_a_trial_beside_another(browser: Any, results: Path) -> None:
@@ -483,6 +478,6 @@ def test_a_link_restores_a_trial_beside_another(browser: Any, results: Path) -> 
     wait(page, f"return location.hash.includes('beside={beside}')")
     again = at(browser, results, trial=trial, beside=beside, tolerance="2")
     wait(again, "return !document.getElementById('run').hidden")
-    wait(again, "return document.querySelectorAll('#replays figure:not([hidden])').length == 2")
+    wait(again, "return document.querySelectorAll('#replays > div:not([hidden])').length == 2")
     assert again.execute_script("return document.getElementById('beside').value") == beside
     assert again.execute_script("return document.getElementById('tolerance').value") == "2"
