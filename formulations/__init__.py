@@ -19,6 +19,7 @@ from formulations.jacobian_transpose import JacobianTranspose
 from formulations.joint_centering import JointCentering
 from formulations.jparse import JParse
 from formulations.levenberg_marquardt import LevenbergMarquardt
+from formulations.levenberg_marquardt_null_space import LevenbergMarquardtNullSpace
 from formulations.lp_alpha import LpAlpha
 from formulations.lp_alpha_components import LpAlphaComponents
 from formulations.lp_alpha_cvxpy import LpAlphaCvxpy
@@ -51,6 +52,7 @@ FORMULATIONS: Mapping[str, type[Formulation]] = MappingProxyType(
         "dls-manipulability": ManipulabilityDamping,
         "dls-variable": VariableDamping,
         "lm": LevenbergMarquardt,
+        "lm-null-space": LevenbergMarquardtNullSpace,
         "sdls": SelectiveDamping,
         "sv-filter": SingularValueFiltering,
         "jparse": JParse,

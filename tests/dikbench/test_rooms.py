@@ -34,6 +34,7 @@ ROOMS: Final = (
     "report",
     "tuning",
     "invariants",
+    "published",
     "viewer",
     "cli",
 )
