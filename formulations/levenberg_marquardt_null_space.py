@@ -83,22 +83,20 @@ class LevenbergMarquardtNullSpace(Parameters):
         """See `Formulation`."""
         v = LevenbergMarquardt(self.error_factor, self.damping).velocity(problem, solve)
         J = problem.primary.J
-        push = self.limit_gain * self._away_from_limits(problem.limits)
+        push = self.limit_gain * self._away_from_limits(problem.limits, v)
         if self._rewards(problem):
             gradient = manipulability_gradients(
                 J.reshape(-1, *J.shape[-2:]), columns_before(problem.robot)
             )
-            push = push + self.manipulability_gain * gradient.reshape(v.shape)
-        if np.ndim(push) == 0:
-            return v
-        freely: Array = v + push - least_norm(J, times(J, push), self.rank_tolerance)
-        return freely
+            push += self.manipulability_gain * gradient.reshape(v.shape)
+        v += push - least_norm(J, times(J, push), self.rank_tolerance)
+        return v
 
-    def _away_from_limits(self, limits: Limits) -> Array | float:
-        """Compute S, (nv,) or (N, nv), 0 where no position limits are in force."""
+    def _away_from_limits(self, limits: Limits, v: Array) -> Array:
+        """Compute S, as many as v has, (nv,) or (N, nv); 0 without position limits in force."""
         joint, below, above = limits.joint, limits.to_lower, limits.to_upper
         if joint.position is None or below is None or above is None:
-            return 0.0
+            return np.zeros_like(v)
         reach = self.influence_share * (joint.position.upper - joint.position.lower)
         limited = np.isfinite(reach)
         if np.any(reach[limited] <= self.stop_distance):

@@ -9,17 +9,20 @@ from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any
 
 import msgspec
 
 from dikbench.errors import DikbenchError, unknown
+from dikbench.published.agreement import Agreement
+from dikbench.published.circle import Circle
+from dikbench.published.folder import FOLDER
+from dikbench.published.lecture import Matrix, Statements
 from dikbench.published.measured import Measured, Statistic
 from dikbench.published.searches import Searches
+from dikbench.published.twists import Twists
 
-FOLDER: Final = Path(__file__).parent / "experiments"
-
-Protocol = Searches
+Protocol = Searches | Twists | Circle | Agreement | Statements | Matrix
 
 
 class Row(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from concurrent.futures import as_completed
 from dataclasses import dataclass
-from math import isnan
 from typing import Any
 
 from dikbench.errors import DikbenchError, in_words
@@ -17,9 +16,9 @@ from dikbench.run.progress_display import ProgressDisplay
 EXPLANATION = """\
 Each cell is *published / here*; "± x" is half of the noise band, two standard errors of the sample
 (of a median, the order statistics two deviations from the middle). **equal**: every number is the
-same, as printed. **inside noise**: every number that has a band is inside it (the largest of a
-sample has none). **not reproduced** names the columns that are not. **ours**: a row that was not
-published. **not covered**: nothing here does what the row is about."""
+same, as printed. **inside noise**: every number is inside its band (the largest of a sample has
+none and decides nothing). **not reproduced** names the columns that are not. **ours**: a row that
+was not published. **not covered**: nothing here does what the row is about."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +77,9 @@ def measure_row(name: str, number: int) -> dict[str, Measured] | str:
         return in_words(error)
 
 
-def _reproduced(experiment: Experiment, row: Row, found: dict[str, Measured] | str | None) -> Any:
+def _reproduced(
+    experiment: Experiment, row: Row, found: dict[str, Measured] | str | None
+) -> Reproduced:
     if found is None or isinstance(found, str):
         return Reproduced(row, None, f"not covered: {row.not_covered or found}")
     return Reproduced(row, found, verdict(experiment.statistics, row.published, found))
@@ -104,7 +105,8 @@ def as_markdown(name: str, reproduced: Iterable[Reproduced]) -> str:
     for each in rows:
         cells = [_cell(statistic, key, each) for key, statistic in columns]
         formulation = f"`{each.row.formulation}`" if each.row.formulation else "-"
-        lines.append("| " + " | ".join([each.row.name, formulation, *cells, each.verdict]) + " |")
+        name_of_row = each.row.name.replace("|", r"\|")
+        lines.append("| " + " | ".join([name_of_row, formulation, *cells, each.verdict]) + " |")
     lines += ["", "```bash", f"dikbench reproduce {name}", "```"]
     for note in experiment.notes:
         lines += ["", note]
@@ -113,12 +115,14 @@ def as_markdown(name: str, reproduced: Iterable[Reproduced]) -> str:
 
 def _cell(statistic: Statistic, key: str, each: Reproduced) -> str:
     published = each.row.published.get(key)
+    if published is None and each.row.published:
+        return ""
     left = "-" if published is None else statistic.text(published)
     if each.measured is None:
         return left
     found = each.measured[key]
     right = statistic.text(found.value)
-    if left == right or isnan(found.low):
+    if left == right or not found.low < found.high:
         return f"{left} / {right}"
     return f"{left} / {right} ± {statistic.text((found.high - found.low) / 2)}"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import ClassVar, Final, Literal
+from typing import Any, ClassVar, Final, Literal
 
 import msgspec
 import numpy as np
@@ -82,7 +82,7 @@ class Searches(msgspec.Struct, frozen=True, tag="searches", tag_field="protocol"
             "median_iterations": Statistic("median iterations", 1),
             "infeasible": Statistic("infeasible %"),
             "mean_searches": Statistic("mean searches"),
-            "max_searches": Statistic("most searches", 0),
+            "max_searches": Statistic("most searches", 0, extreme=True),
             "violations": Statistic("outside limits", 0),
         }
     )
@@ -200,7 +200,7 @@ class _Searching:
         """Make a step; return also E before it, (N,), and where there is none, (N,)."""
         there: Array = q.copy()
         E: Array = np.full(len(q), np.inf)
-        finite: Mask = np.isfinite(q).all(axis=1)
+        finite: Any = np.isfinite(q).all(axis=1)
         if finite.any():
             # Steps may lead as far as numbers go.
             with np.errstate(over="ignore", invalid="ignore"):
@@ -246,5 +246,6 @@ class _Searching:
         lower, upper = self._limits.lower, self._limits.upper
         least = -np.pi if self._rules.wrap == "half-turn" else lower
         wrapped = (q - least) % TURN + least
-        outside: Mask = np.logical_or(wrapped < lower, wrapped > upper).any(axis=1)
+        wrong: Any = np.logical_or(wrapped < lower, wrapped > upper).any(axis=1)
+        outside: Mask = wrong
         return outside
