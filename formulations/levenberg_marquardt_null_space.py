@@ -7,7 +7,6 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from dikbench.errors import DikbenchError
 from dikbench.problem import (
     Array,
     DikProblem,
@@ -36,13 +35,13 @@ class LevenbergMarquardtNullSpace(Parameters):
         v = v_LM + (I - J^+ J) (k_S S(q) + k_m J_m),   v_LM as `lm` has it
         S_i = ((rho_i - rho_0)/(rho_0 - rho_s))^2 away from a limit at a distance rho_i <= rho_0
 
-    and 0 elsewhere; rho_0 is a share of the joint's range, J_m (nv,) the gradient of the
-    manipulability sqrt det(J J^T). J (m, nv), V (m,), the error (m,) and the weights are the
-    primary task's, in the task frame; v in rad/s. The pseudo-inverse with error_factor and damping
-    0. Keeps away from limits as far as the null space allows, but does not keep them: the push has
-    its full size at the limit itself whatever the time step, and at a wrong gain it keeps the arm
-    from settling. J_m is left out where the first priority is not one whole pose. Ignores limits
-    otherwise, and other tasks.
+    and 0 elsewhere; rho_0 is a share of the joint's range (a range narrower than rho_s has no
+    push), J_m (nv,) the gradient of the manipulability sqrt det(J J^T). J (m, nv), V (m,), the
+    error (m,) and the weights are the primary task's, in the task frame; v in rad/s. The
+    pseudo-inverse with error_factor and damping 0. Keeps away from limits as far as the null space
+    allows, but does not keep them: the push has its full size at the limit itself whatever the time
+    step, and at a wrong gain it keeps the arm from settling. J_m is left out where the first
+    priority is not one whole pose. Ignores limits otherwise, and other tasks.
 
     Attributes:
         error_factor: see `lm`.
@@ -98,13 +97,8 @@ class LevenbergMarquardtNullSpace(Parameters):
         if joint.position is None or below is None or above is None:
             return np.zeros_like(v)
         reach = self.influence_share * (joint.position.upper - joint.position.lower)
-        limited = np.isfinite(reach)
-        if np.any(reach[limited] <= self.stop_distance):
-            raise DikbenchError(
-                f"stop_distance={self.stop_distance} must be below the influence distances, "
-                f"{float(reach.min()):g} rad at the least"
-            )
-        reach = np.where(limited, reach, 1.0)
+        limited = np.isfinite(reach) & (reach > self.stop_distance)
+        reach = np.where(limited, reach, self.stop_distance + 1.0)
         size = reach - self.stop_distance
         up, down = (
             (np.minimum(np.where(limited, distance, reach) - reach, 0.0) / size) ** 2

@@ -61,6 +61,8 @@ def of_mean(sample: Array, others: int = 0) -> Measured:
         others: size of the published sample; 0: it is this one, so that only a few trials differ
             and the band of one sample is ample.
     """
+    if not len(sample):
+        return Measured(nan)
     return _around(float(np.mean(sample)), float(np.std(sample)), len(sample), others)
 
 
@@ -78,6 +80,8 @@ def of_count(counted: Mask) -> Measured:
 
 def of_median(sample: Array) -> Measured:
     """Measure a median; the band is between the order statistics two deviations from the middle."""
+    if not len(sample):
+        return Measured(nan)
     ranked, middle = np.sort(sample), len(sample) / 2
     away = DEVIATIONS * sqrt(len(sample)) / 2
     low, high = (int(np.clip(middle + s * away, 0, len(sample) - 1)) for s in (-1, 1))

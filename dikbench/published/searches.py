@@ -152,6 +152,7 @@ class _Searching:
         program = program_of(formulation)
         solver = None if program is None else parse_solver(DEFAULT_SOLVER[program])
         self._solve = make_solve(solver, program)
+        self._together = program is None and is_batched(formulation)
 
     def run(self) -> _Found:
         """Search until each target is reached or given up.
@@ -222,7 +223,7 @@ class _Searching:
     def _velocity(self, problem: DikProblem) -> Array:
         """Ask for all rows at once, and alone for those that are not answered so, (n, nv)."""
         v = np.full(problem.q.shape, np.nan)
-        if is_batched(self._formulation):
+        if self._together:
             try:
                 v = self._formulation.velocity(problem, self._solve)
             except np.linalg.LinAlgError:
