@@ -38,6 +38,7 @@ from formulations.sns import SaturationInNullSpace
 from formulations.sns_optimal import OptimalSaturationInNullSpace
 from formulations.truncated_svd import TruncatedSvd
 from formulations.variable_damping import VariableDamping
+from formulations.virtual_dynamics import VirtualDynamics
 from formulations.weighted_least_norm import WeightedLeastNorm
 from formulations.weighted_qp import WeightedQp
 
@@ -54,6 +55,7 @@ FORMULATIONS: Mapping[str, type[Formulation]] = MappingProxyType(
         "lm": LevenbergMarquardt,
         "lm-null-space": LevenbergMarquardtNullSpace,
         "sdls": SelectiveDamping,
+        "virtual-dynamics": VirtualDynamics,
         "sv-filter": SingularValueFiltering,
         "jparse": JParse,
         "condition-governor": ConditionGovernor,

@@ -15,6 +15,7 @@ import msgspec
 
 from dikbench.errors import DikbenchError, unknown
 from dikbench.published.agreement import Agreement
+from dikbench.published.bargain import Bargain
 from dikbench.published.circle import Circle
 from dikbench.published.folder import FOLDER
 from dikbench.published.lecture import Matrix, Statements
@@ -22,7 +23,7 @@ from dikbench.published.measured import Measured, Statistic
 from dikbench.published.searches import Searches
 from dikbench.published.twists import Twists
 
-Protocol = Searches | Twists | Circle | Agreement | Statements | Matrix
+Protocol = Searches | Twists | Circle | Agreement | Statements | Matrix | Bargain
 
 
 class Row(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -55,6 +55,11 @@ def reproduce(names: Sequence[str], jobs: int) -> dict[str, list[Reproduced]]:
     ]
     measured: dict[tuple[str, int], Any] = {}
     with workers(jobs) as pool, ProgressDisplay(len(todo), "rows") as display:
+        # The longest rows first, as far as it is known, so that none is left for the end.
+        todo.sort(
+            key=lambda key: experiments[key[0]].rows[key[1]].published.get("mean_iterations", 0.0),
+            reverse=True,
+        )
         waiting = {pool.schedule(measure_row, args=(*key,)): key for key in todo}
         for future in as_completed(waiting):
             measured[waiting[future]] = future.result()
@@ -91,7 +96,8 @@ def as_markdown(name: str, reproduced: Iterable[Reproduced]) -> str:
     columns = [
         (key, statistic)
         for key, statistic in experiment.statistics.items()
-        if any(key in each.row.published for each in rows)
+        if all(not each.row.published for each in rows)
+        or any(key in each.row.published for each in rows)
     ]
     heading = ["row", "formulation", *(statistic.heading for _, statistic in columns), "verdict"]
     lines = [

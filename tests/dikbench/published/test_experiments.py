@@ -16,6 +16,7 @@ from makers.commands import in_process
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_formulation
 from dikbench.published.agreement import Agreement
+from dikbench.published.bargain import Bargain
 from dikbench.published.circle import Circle
 from dikbench.published.experiment import Experiment, load_experiment, published_experiments
 from dikbench.published.lecture import Statements
@@ -141,6 +142,17 @@ def test_statements_count_what_leaves_the_direction_and_the_limits() -> None:
     assert clipped["direction"] == free["limits"] > 20
     assert clipped["limits"] == scaled["limits"] == scaled["direction"] == 0
     assert free["first_task"] == free["stopped"] == 0
+
+
+def test_the_bargain_of_damping_is_that_of_its_singular_values() -> None:
+    """Of unit twists: speeds up to 1/(2 lambda), losses up to lambda^2/(s^2 + lambda^2)."""
+    rules = Bargain("ur5", count=40)
+    found = {name: each.value for name, each in rules.measure("dls[damping=0.05]").items()}
+    assert 9.5 < found["speed"] <= 10
+    assert 0 < found["away"] < found["near"] < 1
+    assert found["away"] < 0.05**2 / (rules.near**2 + 0.05**2)
+    exact = {name: each.value for name, each in rules.measure("pinv").items()}
+    assert exact["near"] == pytest.approx(0, abs=1e-9)
 
 
 def test_the_command_prints_and_writes_the_tables(tmp_path: Path) -> None:
