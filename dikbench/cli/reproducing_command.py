@@ -31,6 +31,7 @@ def reproduce(names: tuple[str, ...], out: Path | None, jobs: int | None) -> Non
     verdict: equal, inside noise, not reproduced, or not covered and why. Targets and starts are
     drawn with the seeds of the sources.
     """
+    from dikbench.errors import DikbenchError
     from dikbench.published.reproducing import (
         EXPLANATION,
         as_markdown,
@@ -40,6 +41,8 @@ def reproduce(names: tuple[str, ...], out: Path | None, jobs: int | None) -> Non
     )
     from dikbench.run.pool import available_cores
 
+    if out is not None and not out.parent.is_dir():
+        raise DikbenchError(f"--out {out}: no such folder: {out.parent}; valid: one that exists")
     found = reproduce(names, jobs or available_cores())
     for name, rows in found.items():
         click.echo(as_markdown(name, rows) + "\n")

@@ -173,6 +173,13 @@ def test_an_unknown_experiment_is_refused() -> None:
     assert "did you mean 'lecture'?" in result.output + result.stderr
 
 
+def test_a_folder_that_is_missing_is_refused_before_the_run(tmp_path: Path) -> None:
+    """Not after minutes."""
+    result = in_process("reproduce", "--out", str(tmp_path / "missing" / "published.md"))
+    assert result.exit_code == 2
+    assert "no such folder" in result.output + result.stderr
+
+
 def test_every_experiment_is_listed() -> None:
     """Name, title and source on a line."""
     lines = in_process("list", "published").output.splitlines()
