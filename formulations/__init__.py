@@ -20,6 +20,7 @@ from formulations.jacobian_transpose import JacobianTranspose
 from formulations.joint_centering import JointCentering
 from formulations.jparse import JParse
 from formulations.levenberg_marquardt import LevenbergMarquardt
+from formulations.levenberg_marquardt_null_space import LevenbergMarquardtNullSpace
 from formulations.lp_alpha import LpAlpha
 from formulations.lp_alpha_components import LpAlphaComponents
 from formulations.lp_alpha_cvxpy import LpAlphaCvxpy
@@ -39,6 +40,7 @@ from formulations.sns import SaturationInNullSpace
 from formulations.sns_optimal import OptimalSaturationInNullSpace
 from formulations.truncated_svd import TruncatedSvd
 from formulations.variable_damping import VariableDamping
+from formulations.virtual_dynamics import VirtualDynamics
 from formulations.weighted_least_norm import WeightedLeastNorm
 from formulations.weighted_qp import WeightedQp
 
@@ -55,7 +57,9 @@ FORMULATIONS: Mapping[str, type[Formulation]] = MappingProxyType(
         "dls-manipulability": ManipulabilityDamping,
         "dls-variable": VariableDamping,
         "lm": LevenbergMarquardt,
+        "lm-null-space": LevenbergMarquardtNullSpace,
         "sdls": SelectiveDamping,
+        "virtual-dynamics": VirtualDynamics,
         "sv-filter": SingularValueFiltering,
         "jparse": JParse,
         "condition-governor": ConditionGovernor,

@@ -14,6 +14,7 @@ import click
 from dikbench.cli.checking import check
 from dikbench.cli.one_line_errors import one_line_errors
 from dikbench.cli.reading_commands import compare, replay, table
+from dikbench.cli.reproducing_command import reproduce
 from dikbench.cli.tuning_command import tune
 
 EXIT_CODE_OF_STANDSTILL = 3
@@ -21,6 +22,7 @@ EXIT_CODE_OF_STANDSTILL = 3
 
 SUBJECTS = (
     "formulations", "scenarios", "solvers", "plants", "robots", "metrics", "outcomes", "studies",
+    "published",
 )  # fmt: skip
 
 
@@ -339,5 +341,6 @@ def show(name: str, figure: Path | None, instance: int | None) -> None:
 commands.add_command(check)
 commands.add_command(compare)
 commands.add_command(replay)
+commands.add_command(reproduce)
 commands.add_command(table)
 commands.add_command(tune)

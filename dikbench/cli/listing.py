@@ -10,6 +10,7 @@ from typing import Final
 from dikbench.metrics import METRICS, OUTCOME_SENTENCES, Metric
 from dikbench.plugins.finding import Plugin, plugins
 from dikbench.problem.problem import not_installed
+from dikbench.published.experiment import load_experiment, published_experiments
 from dikbench.robots.catalogue import ROBOTS
 from dikbench.scenario.oracle import ORACLE, SLOWED_ORACLE
 from dikbench.scenario.plant import PLANTS
@@ -90,6 +91,10 @@ _SUBJECTS: Mapping[str, Callable[[], list[tuple[str, str, str]]]] = {
     "metrics": _metrics,
     "outcomes": lambda: [(each.value, text, "") for each, text in OUTCOME_SENTENCES.items()],
     "studies": lambda: [(n, load_study(n).description, "") for n in shipped_studies()],
+    "published": lambda: [
+        (name, load_experiment(name).title, load_experiment(name).source)
+        for name in published_experiments()
+    ],
 }
 
 

@@ -149,8 +149,11 @@ def _sight(pursuit: Pursuit, kinematics: Kinematics) -> Sight:
     """
     robot, tracking, log6 = pursuit.robot, pursuit.tracking, pin.log6
     rows, frame, placement = np.array(robot.task_rows), robot.frame_id, kinematics.placement
-    ours = type(tracking) is PoseTask and tracking.frame in (None, robot.frame)
-    if not ours or not goes_along_screw(robot):
+    if (
+        type(tracking) is not PoseTask
+        or tracking.frame not in (None, robot.frame)
+        or not goes_along_screw(tracking, robot)
+    ):
         return _task_sight(tracking, kinematics)
     if len(rows) == 6:
         return (

@@ -35,6 +35,7 @@ ROOMS: Final = (
     "report",
     "tuning",
     "invariants",
+    "published",
     "cli",
 )
 """From the ground up: a room imports from those before it, and from nothing behind it."""

@@ -13,7 +13,11 @@ from makers.problems import kinematics_at, velocity_of
 from dikbench import DikbenchError, PositionTask, Robot, load_robot, solve_dik
 from dikbench.problem.posing import pose_problem
 from dikbench.robots.robot import model_limits
-from formulations.manipulability import columns_before, manipulability_gradient
+from formulations.manipulability import (
+    columns_before,
+    manipulability_gradient,
+)
+from formulations.manipulability_gradients import manipulability_gradients
 
 RX, RY, RZ = pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ
 PX, PY, PZ = pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ
@@ -71,6 +75,22 @@ def test_the_gradient_is_the_derivative_on_the_manifold(name: str, spread: float
     if name == "humanoid":
         assert np.array_equal(found[:6], np.zeros(6))
         assert np.array_equal(found, manipulability_gradient(J))
+
+
+@pytest.mark.parametrize("robot", [*CHAINS.values(), load_robot("panda"), load_robot("planar4r")])
+def test_the_gradients_of_many_are_those_of_each(robot: Robot) -> None:
+    """Of chains, free-flyers and planar arms; zero where the Jacobian has no rank."""
+    random = np.random.default_rng(2)
+    rows = list(robot.task_rows)
+    jacobians = [np.zeros((len(rows), robot.nv))]
+    for _ in range(4):
+        q = pin.integrate(robot.model, robot.q0, 0.5 * random.normal(size=robot.nv))
+        jacobians.append(kinematics_at(robot, q).jacobian(robot.frame_id)[rows])
+    before = columns_before(robot)
+    expected = np.array([manipulability_gradient(J, before) for J in jacobians])
+    assert np.abs(expected).max() > 1e-3
+    found = manipulability_gradients(np.array(jacobians), before)
+    assert found == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ ELBOW: Final[dict[str, Any]] = {
     "gain": 0.3,
 }
 WEIGHTS: Final = np.array([0.3, 2.0, 5.0, 0.1, 1.0, 3.0])
-WEIGHS: Final = {"qp", "hqp", "lm", "pink-qp", "mink-qp"}
+WEIGHS: Final = {"qp", "hqp", "lm", "lm-null-space", "pink-qp", "mink-qp"}
 SEES_LOWER: Final = {
     *{"qp", "hqp", "pink-qp", "mink-qp", "sns", "sns-optimal"},
     *{"nullspace", "nullspace-robust", "nullspace-unprojected"},

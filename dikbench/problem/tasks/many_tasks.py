@@ -12,7 +12,13 @@ from dikbench.arrays import Array
 from dikbench.linear_algebra import scaled_identity
 from dikbench.problem.tasks.damping import DampingTask
 from dikbench.problem.tasks.orientation import LinearizedOrientation, OrientationTask
-from dikbench.problem.tasks.pose import LinearizedPose, PoseTask, goes_along_screw
+from dikbench.problem.tasks.pose import (
+    LinearizedParts,
+    LinearizedPose,
+    PoseTask,
+    goes_along_screw,
+    is_whole,
+)
 from dikbench.problem.tasks.position import PositionTask
 from dikbench.problem.tasks.posture import PostureTask
 from dikbench.problem.tasks.task import (
@@ -54,12 +60,14 @@ def kind_of_tracking(task: TrackingTask, robot: Robot) -> Hashable | None:
     assert isinstance(task, FrameTask)
     if task.frame is not None or np.ndim(task.weight) or _asks_for_few_turns(task, robot):
         return None
-    return type(task), task.gain, task.weight, task.priority, robot.task_rows, robot.task_axes
+    convention = task.convention if isinstance(task, PoseTask) else None
+    shared = task.gain, task.weight, task.priority, convention
+    return type(task), *shared, robot.task_rows, robot.task_axes
 
 
 def _asks_for_few_turns(task: Any, robot: Robot) -> bool:
     """Whether one or two of three angular rows are asked for, whose errors are special."""
-    if not isinstance(task, PoseTask) or goes_along_screw(robot):
+    if not isinstance(task, PoseTask) or goes_along_screw(task, robot):
         return False
     return 0 < sum(row >= 3 for row in robot.task_rows) < 3
 
@@ -84,7 +92,7 @@ def linearize_tracking(
     away = turned(R.transpose(0, 2, 1), targets.translations - kinematics.translations)
     linear = turned(relative, targets.twists[:, :3])
     angular = turned(relative, targets.twists[:, 3:])
-    if isinstance(task, PoseTask) and goes_along_screw(robot):
+    if isinstance(task, PoseTask) and goes_along_screw(task, robot):
         error = logarithms(relative, away)
         V = np.concatenate([linear + crossed(away, angular), angular], axis=1)
         rows = slice(None) if robot.task_rows == ALL_ROWS else np.array(robot.task_rows)
@@ -148,9 +156,11 @@ def row_of(many: LinearizedTask, k: int, task: Any, robot: Robot, relative: Any)
     parts = (J, many.V[k], many.error[k], many.weight, many.priority)
     if isinstance(many, LinearizedJointTask):
         return LinearizedJointTask(*parts)
-    if isinstance(task, PoseTask) and goes_along_screw(robot):
+    if isinstance(task, PoseTask) and goes_along_screw(task, robot):
         rows = None if robot.task_rows == ALL_ROWS else np.array(robot.task_rows)
         return LinearizedPose(*parts, relative, rows)
+    if isinstance(task, PoseTask) and is_whole(robot):
+        return LinearizedParts(*parts, relative.rotation)
     if isinstance(task, OrientationTask):
         Q = relative.rotation
         return LinearizedOrientation(*parts, Q, np.array(task.rows(robot)) - 3)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, Literal, get_args
 
 import numpy as np
 import pinocchio as pin
+import scipy.linalg
 
 from dikbench.arrays import Array
-from dikbench.errors import DikbenchError
+from dikbench.errors import DikbenchError, unknown
 from dikbench.problem.tasks.rows import in_task_axes, orientation_error
 from dikbench.problem.tasks.task import FrameTask, LinearizedTask, check_rotation, check_weight
 from dikbench.robots.kinematics import Kinematics
@@ -19,10 +20,13 @@ from dikbench.robots.task_rows import ALL_ROWS, PLANE_ROWS
 TILTS: Final = frozenset({3, 4})
 """The rows of turns about axes in the plane."""
 
+ErrorConvention = Literal["log6", "decoupled"]
+"""Whether the error of a pose is the logarithm of a placement, or position and rotation apart."""
 
-def goes_along_screw(robot: Robot) -> bool:
-    """Say whether pose tasks bring a frame to its target along a screw (see `PoseTask`)."""
-    if robot.task_axes != "body":
+
+def goes_along_screw(task: PoseTask, robot: Robot) -> bool:
+    """Say whether a pose task brings a frame to its target along a screw (see `PoseTask`)."""
+    if task.convention != "log6" or robot.task_axes != "body":
         return False
     rows = robot.task_rows
     return rows == ALL_ROWS or (rows == PLANE_ROWS and not TILTS & {*robot.movable_rows})
@@ -37,15 +41,30 @@ class PoseTask(FrameTask):
     with X the placement of the frame, X_d the target, V_d the target's own body twist and J the
     body Jacobian: twists are (linear; angular) [m/s; rad/s] in the axes of the frame. In the plane
     (`Robot.task_rows` of (0, 1, 5) of an arm that cannot tilt) the other rows are left out. Where
-    other rows are asked for, position and orientation are brought there independently, in the
-    robot's task axes:
+    other rows are asked for, or the convention is `decoupled`, position and orientation are brought
+    there independently, in the robot's task axes:
 
         e = (R^T (p_d - p); rotation error),   V = (R^T R_d v_d; R^T R_d w_d) + gain e
 
-    with the rotation error of `dikbench.problem.tasks.rows.orientation_error`.
+    with the rotation error of `dikbench.problem.tasks.rows.orientation_error`: of a whole pose
+    log3(R^T R_d), the angle-axis error of most robotics libraries.
 
     The target is a placement X_d (`pinocchio.SE3`).
+
+    Attributes:
+        convention: of the error, `log6` or `decoupled`.
     """
+
+    convention: ErrorConvention = "log6"
+
+    def __post_init__(self) -> None:
+        """Check the convention.
+
+        Raises:
+            DikbenchError: if there is no such convention.
+        """
+        if self.convention not in get_args(ErrorConvention):
+            raise unknown("pose task: convention", self.convention, get_args(ErrorConvention))
 
     def rows(self, robot: Robot) -> tuple[int, ...]:
         """See `FrameTask`."""
@@ -65,7 +84,7 @@ class PoseTask(FrameTask):
         check_rotation("pose task", X_d.rotation)
         check_weight("pose task", self.weight, len(robot.task_rows))
         X = kinematics.placement(index)
-        if not goes_along_screw(robot):
+        if not goes_along_screw(self, robot):
             return self._parts(kinematics, X, X_d, velocity)
         relative = X.actInv(X_d)
         error: Array = pin.log6(relative).np
@@ -96,7 +115,15 @@ class PoseTask(FrameTask):
             V[3:] += in_task_axes(robot, R, Q @ velocity.angular)
         J = kinematics.jacobian(self.frame_id(robot))
         J = np.vstack([in_task_axes(robot, R, J[:3]), in_task_axes(robot, R, J[3:])])
-        return LinearizedTask(J[rows], V[rows], error[rows], self.weight, self.priority)
+        J, V, error = J[rows], V[rows], error[rows]
+        if is_whole(robot):
+            return LinearizedParts(J, V, error, self.weight, self.priority, Q)
+        return LinearizedTask(J, V, error, self.weight, self.priority)
+
+
+def is_whole(robot: Robot) -> bool:
+    """Say whether a robot is asked for whole poses in the axes of its frame."""
+    return robot.task_rows == ALL_ROWS and robot.task_axes == "body"
 
 
 class LinearizedPose(LinearizedTask, eq=False):
@@ -115,3 +142,22 @@ class LinearizedPose(LinearizedTask, eq=False):
         """Jlog6(X_d^-1 X), (m, m)."""
         Jl: Array = pin.Jlog6(self.relative.inverse())
         return Jl if self.rows is None else Jl[np.ix_(self.rows, self.rows)]
+
+
+class LinearizedParts(LinearizedTask, eq=False):
+    """A pose task at one configuration, position and orientation apart.
+
+    Attributes:
+        relative: R^T R_d, the target's rotation seen from the frame, (3, 3).
+    """
+
+    relative: Any = None
+
+    @property
+    def log_derivative(self) -> Array | None:
+        """The block-diagonal matrix of I and Jlog3(R_d^T R), (6, 6).
+
+        The error changes by -Jl J v as seen from the world: the frame's axes turn on their own.
+        """
+        Jl: Array = scipy.linalg.block_diag(np.eye(3), pin.Jlog3(self.relative.T))
+        return Jl

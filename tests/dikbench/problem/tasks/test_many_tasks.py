@@ -96,6 +96,14 @@ def test_chosen_rows_are_those_of_each_row(rows: str) -> None:
     _assert_as_alone(robot, task, 2)
 
 
+@pytest.mark.parametrize("name", ["panda", "talos-humanoid"])
+def test_decoupled_errors_are_those_of_each_row(name: str) -> None:
+    """The other convention of a pose's error, which is a kind of its own."""
+    robot, task = load_robot(name), PoseTask(gain=3.0, weight=2.0, convention="decoupled")
+    assert kind_of_tracking(task, robot) != kind_of_tracking(PoseTask(gain=3.0, weight=2.0), robot)
+    _assert_as_alone(robot, task, 3)
+
+
 @pytest.mark.parametrize(
     "task", [PoseTask(frame="panda_link5"), PoseTask(weight=np.ones(6))], ids=["frame", "weights"]
 )

@@ -1,0 +1,155 @@
+"""Published experiments run again: rows in worker processes, tables as Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from concurrent.futures import as_completed
+from dataclasses import dataclass
+from typing import Any
+
+from dikbench.errors import DikbenchError, in_words
+from dikbench.published.experiment import Experiment, Row, load_experiment, published_experiments
+from dikbench.published.measured import Measured, Statistic, verdict
+from dikbench.run.pool import workers
+from dikbench.run.progress_display import ProgressDisplay
+
+EXPLANATION = """\
+Each cell is *published / here*; "± x" is half of the noise band, two standard errors of the sample
+(of a median, the order statistics two deviations from the middle). **equal**: every number is the
+same, as printed. **inside noise**: every number is inside its band (the largest of a sample has
+none and decides nothing). **not reproduced** names the columns that are not. **ours**: a row that
+was not published. **not covered**: nothing here does what the row is about."""
+
+
+@dataclass(frozen=True)
+class Reproduced:
+    """A row of an experiment and what came of it.
+
+    Attributes:
+        row: the row.
+        measured: by the names of the statistics; None where it is not covered.
+        verdict: see `verdict`, or `not covered: ...`.
+    """
+
+    row: Row
+    measured: dict[str, Measured] | None
+    verdict: str
+
+
+def reproduce(names: Sequence[str], jobs: int) -> dict[str, list[Reproduced]]:
+    """Run published experiments again, rows side by side.
+
+    Args:
+        names: of experiments; none: all of them.
+        jobs: number of worker processes.
+
+    Raises:
+        DikbenchError: if there is no experiment of a name.
+    """
+    experiments = {name: load_experiment(name) for name in names or published_experiments()}
+    todo = [
+        (name, number)
+        for name, experiment in experiments.items()
+        for number, row in enumerate(experiment.rows)
+        if not row.not_covered
+    ]
+    measured: dict[tuple[str, int], Any] = {}
+    with workers(jobs) as pool, ProgressDisplay(len(todo), "rows") as display:
+        # The longest rows first, as far as it is known, so that none is left for the end.
+        todo.sort(
+            key=lambda key: experiments[key[0]].rows[key[1]].published.get("mean_iterations", 0.0),
+            reverse=True,
+        )
+        waiting = {pool.schedule(measure_row, args=(*key,)): key for key in todo}
+        for future in as_completed(waiting):
+            measured[waiting[future]] = future.result()
+            display.advance()
+    return {
+        name: [
+            _reproduced(experiment, row, measured.get((name, number)))
+            for number, row in enumerate(experiment.rows)
+        ]
+        for name, experiment in experiments.items()
+    }
+
+
+def measure_row(name: str, number: int) -> dict[str, Measured] | str:
+    """Measure a row of an experiment, in a worker; or say why it cannot be."""
+    experiment = load_experiment(name)
+    try:
+        return experiment.measure(experiment.rows[number])
+    except DikbenchError as error:
+        return in_words(error)
+
+
+def _reproduced(
+    experiment: Experiment, row: Row, found: dict[str, Measured] | str | None
+) -> Reproduced:
+    if found is None or isinstance(found, str):
+        return Reproduced(row, None, f"not covered: {row.not_covered or found}")
+    return Reproduced(row, found, verdict(experiment.statistics, row.published, found))
+
+
+def as_markdown(name: str, reproduced: Iterable[Reproduced]) -> str:
+    """Write an experiment and what came of it, with the command that does it again."""
+    experiment, rows = load_experiment(name), [*reproduced]
+    columns = [
+        (key, statistic)
+        for key, statistic in experiment.statistics.items()
+        if all(not each.row.published for each in rows)
+        or any(key in each.row.published for each in rows)
+    ]
+    heading = ["row", "formulation", *(statistic.heading for _, statistic in columns), "verdict"]
+    lines = [
+        f"## {name}: {experiment.title}",
+        "",
+        f"{experiment.source}.",
+        "",
+        "| " + " | ".join(heading) + " |",
+        "|" + "---|" * len(heading),
+    ]
+    for each in rows:
+        cells = [_cell(statistic, key, each) for key, statistic in columns]
+        formulation = f"`{each.row.formulation}`" if each.row.formulation else "-"
+        name_of_row = each.row.name.replace("|", r"\|")
+        lines.append("| " + " | ".join([name_of_row, formulation, *cells, each.verdict]) + " |")
+    lines += ["", "```bash", f"dikbench reproduce {name}", "```"]
+    for note in experiment.notes:
+        lines += ["", note]
+    return "\n".join(lines)
+
+
+def _cell(statistic: Statistic, key: str, each: Reproduced) -> str:
+    published = each.row.published.get(key)
+    if published is None and each.row.published:
+        return ""
+    left = "-" if published is None else statistic.text(published)
+    if each.measured is None:
+        return left
+    found = each.measured[key]
+    right = statistic.text(found.value)
+    if left == right or not found.low < found.high:
+        return f"{left} / {right}"
+    return f"{left} / {right} ± {statistic.text((found.high - found.low) / 2)}"
+
+
+def summary(found: dict[str, list[Reproduced]]) -> str:
+    """Count the verdicts, on a line."""
+    counts: dict[str, int] = {}
+    for rows in found.values():
+        for each in rows:
+            kind = each.verdict.partition(":")[0]
+            counts[kind] = counts.get(kind, 0) + 1
+    return ", ".join(f"{number} {kind}" for kind, number in sorted(counts.items()))
+
+
+def whole_page(found: dict[str, list[Reproduced]]) -> str:
+    """Write all experiments as a page."""
+    parts = [
+        "# Published tables, reproduced or refuted",
+        "Written by `dikbench reproduce --out results/published.md`.",
+        EXPLANATION,
+        f"Rows: {summary(found)}.",
+        *(as_markdown(name, rows) for name, rows in found.items()),
+    ]
+    return "\n\n".join(parts) + "\n"
