@@ -308,10 +308,10 @@ def test_what_families_declare_for_figures_are_numbers_of_theirs() -> None:
 
 
 def test_every_family_can_be_drawn() -> None:
-    """At least one parameter of each has bounds, but for those with one scenario per robot."""
+    """At least one parameter of each has bounds, but for the one that reads a file."""
     without = {
         name
         for name, plugin in plugins("scenario").items()
         if not any(parameter.drawn for parameter in plugin.parameters.values())
     }
-    assert without == {"back-and-forth", "csv"}
+    assert without == {"csv"}
