@@ -9,32 +9,20 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-import sys
 import typing
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from math import inf, isfinite, isnan, nan
 from numbers import Real
-from types import MappingProxyType, NoneType, SimpleNamespace, UnionType
-from typing import Annotated, Any, Final, Literal, TypeVar, Union
+from types import MappingProxyType, NoneType, UnionType
+from typing import Annotated, Any, Final, Literal, Union
 
+from dikbench.annotations import declared_types, marker_in, type_in_words
 from dikbench.errors import DikbenchError
 
 REQUIRED: Final = dataclasses.MISSING
 """Stands for the default of a parameter that must be given."""
-
-Marker = TypeVar("Marker")
-
-_WORDS: Final[Mapping[Any, str]] = MappingProxyType(
-    {
-        bool: "true or false",
-        float: "a number",
-        int: "a whole number",
-        str: "a text",
-        NoneType: "none",
-    }
-)
 
 
 @dataclass(frozen=True)
@@ -93,7 +81,7 @@ class Drawn:
     """The range in which a family's parameter is drawn, or a formulation's is tuned.
 
     Attributes:
-        low, high: finite bounds of a number; a choice among values needs none.
+        low, high: finite bounds of a number; a choice among values and a bool have none.
         log: whether the logarithm is drawn uniformly.
     """
 
@@ -200,10 +188,10 @@ class Parameter:
     def valid(self) -> str:
         """The valid values, in words."""
         if self.range is not None:
-            return f"{_in_words(self.type)}, {self.range}"
+            return f"{type_in_words(self.type)}, {self.range}"
         if self.choices:
             return ", ".join(map(str, self.choices))
-        return _in_words(self.type)
+        return type_in_words(self.type)
 
     def check(self, value: Any) -> None:
         """Check a value.
@@ -252,7 +240,7 @@ def parameters_of(plugin: type) -> Mapping[str, Parameter]:
 def _read(plugin: type, field: dataclasses.Field[Any]) -> Parameter:
     """Read one parameter and check its declaration."""
     default = field.default if field.default_factory is REQUIRED else field.default_factory()
-    hints = [hint for hint in _hints(plugin, field.name) if hint is not None]
+    hints = [hint for hint in declared_types(plugin, field.name) if hint is not None]
     if hints:
         kind = hints[0]
         kind = typing.get_args(kind)[0] if typing.get_origin(kind) is Annotated else kind
@@ -264,53 +252,39 @@ def _read(plugin: type, field: dataclasses.Field[Any]) -> Parameter:
     else:
         number: dict[type, Any] = {bool: bool, int: int | float, float: float}
         kind = number.get(type(default), str)
-    parameter = Parameter(field.name, kind, default, None, _marker(hints, Drawn))
+    parameter = Parameter(field.name, kind, default, None, marker_in(hints, Drawn))
     if parameter.numeric:
-        parameter = dataclasses.replace(parameter, range=_marker(hints, Range))
+        parameter = dataclasses.replace(parameter, range=marker_in(hints, Range))
     problem = "its default"
     try:
         if not parameter.required:
             parameter.check(default)
         problem = "Drawn:"
-        if parameter.drawn is not None and parameter.numeric:
-            for bound in (parameter.drawn.low, parameter.drawn.high):
-                parameter.check(bound)
+        _check_drawn(parameter)
     except DikbenchError as error:
         raise DikbenchError(f"class {plugin.__qualname__}: {problem} {error}") from None
     return parameter
 
 
-def _hints(plugin: type, name: str) -> Iterator[Any]:
-    """Yield the types that a class and its bases declare for a field, its own first.
+def _check_drawn(parameter: Parameter) -> None:
+    """Check that a parameter can be drawn as its class declares it.
 
-    Each is resolved by itself in the module that declares it, so that a name imported for type
-    checkers only gives None and does not affect the others.
+    Raises:
+        DikbenchError: if a bound is outside the range, what is no number has bounds, or there is
+            nothing to draw from.
     """
-    for owner in plugin.__mro__:
-        written = inspect.get_annotations(owner).get(name)
-        if written is None and name not in inspect.get_annotations(owner):
-            continue
-        alone = SimpleNamespace(__annotations__={name: written})
-        names = getattr(sys.modules.get(owner.__module__), "__dict__", {})
-        try:
-            yield typing.get_type_hints(alone, names, include_extras=True)[name]
-        except (NameError, AttributeError, TypeError, SyntaxError):
-            yield None
-
-
-def _in_words(kind: Any) -> str:
-    """Name a type for readers who need not know Python."""
-    parts = typing.get_args(kind) if typing.get_origin(kind) in (Union, UnionType) else (kind,)
-    return " or ".join(_WORDS.get(part, getattr(part, "__name__", str(part))) for part in parts)
-
-
-def _marker(hints: list[Any], kind: type[Marker]) -> Marker | None:
-    """Return the first marker of a kind: a field with a new default keeps its base's range."""
-    for hint in hints:
-        for marker in getattr(hint, "__metadata__", ()):
-            if isinstance(marker, kind):
-                return marker
-    return None
+    drawn, name = parameter.drawn, parameter.name
+    if drawn is None:
+        return
+    if parameter.numeric:
+        for bound in (drawn.low, drawn.high):
+            parameter.check(bound)
+    elif not (parameter.choices or parameter.type is bool):
+        raise DikbenchError(
+            f"{name} is {parameter.valid}; valid: a number, a Literal or a bool, or no Drawn"
+        )
+    elif not isnan(drawn.low):
+        raise DikbenchError(f"{name} is {parameter.valid}, without bounds; valid: Drawn()")
 
 
 def _check_body(cls: type) -> None:

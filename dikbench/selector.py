@@ -11,6 +11,7 @@ import itertools
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Final
 
@@ -80,8 +81,12 @@ def parse_selector(text: str | Selector) -> Selector:
     Raises:
         DikbenchError: if the text has not the form `name[parameter=value,...]`.
     """
-    if isinstance(text, Selector):
-        return text
+    return text if isinstance(text, Selector) else _parsed(text)
+
+
+@lru_cache(maxsize=65536)
+def _parsed(text: str) -> Selector:
+    """Parse a text, of which a table of results has many alike."""
     name, parameters = _parts(text)
     return Selector(_unquoted(name), {key: _unquoted(value) for key, value in parameters.items()})
 

@@ -61,6 +61,19 @@ SET_UPS: Mapping[str, SetUp] = MappingProxyType(
     {
         "lwr": SetUp((0.0, pi / 4, pi / 4, pi / 4, 0.0, 0.0, 0.0), (0.1, 0.35, 0.6235), 3.0),
         "planar4r": SetUp((0.0, pi / 2, -pi / 2, pi / 2), (0.7, 0.0, 0.0), 1.4, (0.0,) * 4),
+        "panda": SetUp(
+            (0.0, -pi / 4, 0.0, -3 * pi / 4, 0.0, pi / 2, pi / 4),
+            (-0.13, -0.19, 0.74),
+            0.9,
+            (-0.15, 0.1, -0.8, -2.85, -0.3, 0.65, -0.45),
+        ),
+        "xarm7": SetUp(
+            (0.0, -0.5, 0.0, 1.0, 0.0, 1.3, 0.0),
+            (-0.05, -0.1, 0.58),
+            0.9,
+            (-0.55, -0.55, 1.15, 2.3, -0.45, 1.5, -0.55),
+        ),
+        "tiago": SetUp((1.4, -0.4, -1.2, 1.5, 0.0, -0.5, 0.4), (0.34, 0.28, 0.86), 0.9),
     }
 )
 
@@ -72,13 +85,15 @@ class Hexagon(NamedRobotFamily):
     A straight line from the start to the top of a hexagon of radius 0.2 m, then clockwise from
     corner to corner, all at the same speed: in the y-z plane about (0.1, 0.35, 0.6235) m, from
     (0, 45, 45, 45, 0, 0, 0) deg, for the LWR; in the x-y plane about (0.7, 0) m, from
-    (0, 90, -90, 90) deg, for the planar arm. The least-norm motion leaves the joints' ranges and,
-    at higher speeds, exceeds their velocity limits. On the planar arm the null space can keep the
-    limits: a motion that does so is the least-norm one with a pull of the joints towards 0. On the
-    LWR nothing can: a corner is 0.30 m from the shoulder, and with the elbow at its limit of 120
-    deg the tool is at least 0.317 m away. In the original each corner is the target until it is
-    near; here the same lines are indexed by time, so that every formulation has the same targets. A
-    seed moves the start by up to 0.05 rad per joint.
+    (0, 90, -90, 90) deg, for the planar arm. Panda, xArm7 and TIAGo, which are not in the original,
+    have hexagons that ask for the same. The least-norm motion leaves the joints' ranges and, at
+    higher speeds, exceeds their velocity limits. On the planar arm, the Panda and the xArm7 the
+    null space can keep the limits: a motion that does so is the least-norm one with a pull of the
+    joints towards a posture. On the TIAGo none is known, and on the LWR nothing can: a corner is
+    0.30 m from the shoulder, and with the elbow at its limit of 120 deg the tool is at least 0.317
+    m away. In the original each corner is the target until it is near; here the same lines are
+    indexed by time, so that every formulation has the same targets. A seed moves the start by up to
+    0.05 rad per joint.
 
     Provokes: position and velocity limits that the least-norm motion breaks
 
@@ -92,7 +107,7 @@ class Hexagon(NamedRobotFamily):
     Source: Flacco, De Luca & Khatib 2012, 2015.
     """
 
-    robot: Literal["lwr", "planar4r"] = "lwr"
+    robot: Literal["lwr", "planar4r", "panda", "xarm7", "tiago"] = "lwr"
     dt: float = 0.001
     speed: Annotated[float, Range(0.05, 2.0, "m/s"), Drawn(0.2, 1.2)] = 0.5
     laps: Annotated[int, Range(1, 5)] = 2

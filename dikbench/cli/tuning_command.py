@@ -48,6 +48,13 @@ from dikbench.cli.one_line_errors import one_line_errors
     help="Worker processes; default: one per core.",
 )
 @click.option(
+    "--rerun",
+    type=click.Choice(["failed", "outdated", "all"]),
+    metavar="WHICH",
+    help="Run finished trials again: failed (such as those that a busy machine stopped at their "
+    "time limit), outdated (made by other sources or versions) or all.",
+)
+@click.option(
     "--freeze",
     is_flag=True,
     help="Write what is found to tuned.toml beside the formulations' files, so that 'dls[tuned]' "
@@ -61,6 +68,7 @@ def tune(
     seed: int,
     out: Path,
     jobs: int | None,
+    rerun: str | None,
     freeze: bool,
 ) -> None:
     """Tune formulations on the train split with equal budgets, and report them on the test split.
@@ -84,7 +92,7 @@ def tune(
     # Two names of the same formulation are one.
     chosen = list({(each.name, repr(make_formulation(each))): each for each in asked}.values())
     command = shlex.join(["dikbench", *sys.argv[1:]])
-    settings = RunSettings(jobs or available_cores(), traces="none")
+    settings = RunSettings(jobs or available_cores(), traces="none", rerun=rerun or "")
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a stop like Ctrl-C
     found = []
     try:

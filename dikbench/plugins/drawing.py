@@ -7,7 +7,7 @@ drawn from a stream of its own, so that one that is added to a family, or fixed,
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import exp, isnan, log
+from math import exp, log
 from typing import Final, get_args
 
 import numpy as np
@@ -90,20 +90,12 @@ def scaled(drawn: Drawn, share: float) -> float:
 
 
 def _drawn(parameter: Parameter, random: np.random.Generator) -> str:
-    """Draw the value of a parameter, as a text that is exact.
-
-    Raises:
-        DikbenchError: if neither choices nor bounds are declared.
-    """
+    """Draw the value of a parameter, as a text that is exact."""
     bounds = parameter.drawn
     assert bounds is not None
-    if parameter.choices:
-        return str(parameter.choices[int(random.integers(len(parameter.choices)))])
+    if choices := ("false", "true") if parameter.type is bool else parameter.choices:
+        return str(choices[int(random.integers(len(choices)))])
     low, high = bounds.low, bounds.high
-    if isnan(low):
-        raise DikbenchError(
-            f"{parameter.name}: Drawn() of {parameter.valid} has no bounds; valid: Drawn(low, high)"
-        )
     if is_whole(parameter) and not bounds.log:
         return str(int(random.integers(int(low), int(high), endpoint=True)))
     value = scaled(bounds, random.uniform())

@@ -18,15 +18,24 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cached_property, lru_cache, partial
 from pathlib import Path
-from types import ModuleType
-from typing import Any, Literal
+from types import MappingProxyType, ModuleType
+from typing import Any, Final, Literal
 
 from dikbench.errors import DikbenchError, in_words, unknown
 from dikbench.parameters import Parameter, parameters_of
 from dikbench.scenario.family import Family
+from dikbench.selector import TUNED
 
 Kind = Literal["formulation", "scenario"]
 Table = Literal["formulation", "scenario", "peer"]
+
+RESERVED: Final[Mapping[Kind, tuple[str, str]]] = MappingProxyType(
+    {
+        "formulation": (TUNED, f"for name[{TUNED}] selects the tuned parameters"),
+        "scenario": ("seed", "for --seed selects it"),
+    }
+)
+"""The word that selectors of a kind have for themselves, and what it does."""
 
 
 @dataclass(frozen=True)
@@ -212,6 +221,11 @@ def _registered(kind: Kind, name: object, entry: Any, file: str) -> Plugin:
         parameters = parameters_of(factory)
     except DikbenchError as error:
         raise DikbenchError(f"{where}: {error}") from None
+    reserved, instead = RESERVED[kind]
+    if reserved in parameters:
+        raise DikbenchError(
+            f"{where}: a parameter cannot be called {reserved!r}, {instead}; valid: another name"
+        )
     if isinstance(entry, partial):
         defaults = {**dict(zip(parameters, entry.args, strict=False)), **entry.keywords}
     try:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import shlex
 import warnings
 from collections.abc import Mapping
 from functools import lru_cache
@@ -14,10 +15,11 @@ from typing import Final
 import msgspec
 
 from dikbench.errors import DikbenchError
+from dikbench.parameters import Drawn
 from dikbench.plugins.drawing import DIGITS
 from dikbench.plugins.finding import formulation_plugin
 from dikbench.plugins.source import source_digest
-from dikbench.selector import TUNED, Selector
+from dikbench.selector import TUNED, Selector, listed
 
 FILE: Final = "tuned.toml"
 
@@ -39,6 +41,20 @@ class Tuned(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     source: str
     success: float
     default_success: float
+
+
+def ranges_of(selector: Selector) -> Mapping[str, Drawn]:
+    """Return the ranges of the parameters that are tuned: numbers that the selector leaves open.
+
+    Raises:
+        DikbenchError: if there is no such formulation.
+    """
+    parameters = formulation_plugin(selector.name).parameters
+    return {
+        name: parameter.drawn
+        for name, parameter in parameters.items()
+        if parameter.drawn is not None and parameter.numeric and name not in selector.parameters
+    }
 
 
 def key_of(selector: Selector) -> str:
@@ -90,18 +106,27 @@ def with_tuned(selector: Selector) -> Selector:
         return selector
     given = {name: text for name, text in selector.parameters.items() if name != TUNED}
     plain = Selector(selector.name, given)
+    if given.keys() - formulation_plugin(selector.name).parameters.keys():
+        return plain  # building it gives the error
     file, key = file_for(plain), key_of(plain)
-    known = read_tuned(file)
+    known, command = read_tuned(file), f"dikbench tune --freeze {shlex.quote(str(plain))}"
     if key not in known:
-        valid = ", ".join(known) or "none yet"
+        asked = f"{TUNED},{listed(given)}" if given else TUNED
+        where, valid = f"formulation {plain.name}[{asked}]", ", ".join(known) or "none yet"
+        open_at_all = ranges_of(Selector(selector.name))
+        if not open_at_all:
+            raise DikbenchError(f"{where}: it has no parameter to tune; valid: {plain}")
+        if not ranges_of(plain):
+            raise DikbenchError(
+                f"{where}: it gives what tuning finds ({', '.join(open_at_all)}); valid: {plain} "
+                f"or {selector.name}[{TUNED}]"
+            )
         raise DikbenchError(
-            f"formulation {selector.name}[{TUNED}]: {key!r} is not tuned in {file}; valid: "
-            f"{valid}; `dikbench tune --freeze {plain}` adds it"
+            f"{where}: {key!r} is not tuned in {file}; valid: {valid}; `{command}` adds it"
         )
     if known[key].source != source_digest(formulation_plugin(selector.name)):
         warnings.warn(
-            f"{key} has another source than when it was tuned ({file}); `dikbench tune --freeze` "
-            "tunes it again",
+            f"{key} has another source than when it was tuned ({file}); `{command}` tunes it again",
             stacklevel=2,
         )
     found = {name: f"{value:.{DIGITS}g}" for name, value in known[key].parameters.items()}

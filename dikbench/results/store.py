@@ -152,9 +152,11 @@ class Store:
         ]
 
     def planned(self) -> pd.DataFrame:
-        """Return the formulation, status, message and steps of the trials of the last plan."""
+        """Return the cells, status, message and steps of the trials of the last plan, by id."""
         return self._frame(
-            "SELECT formulation, status, message, steps FROM trials WHERE position IS NOT NULL", ()
+            f"SELECT id, {', '.join(TRIAL)}, status, message, steps FROM trials "
+            "WHERE position IS NOT NULL ORDER BY position",
+            (),
         )
 
     def hidden(self) -> int:

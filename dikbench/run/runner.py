@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Final
 
-import msgspec
-
 from dikbench.errors import DikbenchError, unknown
+from dikbench.results.columns import TRIAL
 from dikbench.results.folder import ResultsFolder
 from dikbench.results.peers import write_peers
 from dikbench.results.store import Store
@@ -24,12 +24,12 @@ from dikbench.run.peers import compare_with_peers, pairs_of, with_ticks
 from dikbench.run.pool import THREAD_VARIABLES, workers
 from dikbench.run.progress_display import ProgressDisplay
 from dikbench.run.provenance import environment, git_commit, manifest
-from dikbench.run.timing import Contender, time_scenario
+from dikbench.run.timing import time_scenario, to_time
 from dikbench.run.trial_row import TrialRow
 from dikbench.scenario.oracle import ORACLES
 from dikbench.selector import parse_selector
 from dikbench.simulation.status import Status
-from dikbench.study.identity import timing_id
+from dikbench.study.identity import timing_id, trial_id_today
 from dikbench.study.plan import PlannedTrial, expand
 from dikbench.study.study import Study
 from dikbench.study.trial import Trial
@@ -37,10 +37,8 @@ from dikbench.study.trial import Trial
 TIMING_TIMEOUT_S: Final = 900.0
 """Wall-clock limit of the timing of one scenario."""
 
-FATAL_STATUSES: Final = frozenset(
-    status.value for status in (Status.TIMEOUT, Status.CRASHED, Status.OUT_OF_MEMORY)
-)
-"""Statuses of a trial after which its formulation is not timed."""
+MISSING: Final = "missing"
+"""What the status of a trial without a row is called."""
 
 OUTDATED: Final = "outdated"
 RERUNS: Final = ("failed", OUTDATED, "all")
@@ -180,50 +178,32 @@ def _time(
         known: ids of cells whose times are kept.
         described: the environment.
     """
-    done, timing = store.statuses(), study.timing
-    # A formulation that ended its process in a trial would do so again, and lose all times.
-    fatal = {
-        (p.trial.formulation, p.trial.solver) for p in planned if done.get(p.id) in FATAL_STATUSES
+    timing, seed = study.timing, study.seeds[0]
+    wanted = {
+        scenario: cells
+        for scenario, cells in to_time(study, planned, store.statuses()).items()
+        if any(timing_id(*cell, scenario) not in known for cell in cells)
     }
-    cells: list[Contender] = list(
-        dict.fromkeys(
-            cell
-            for p in planned
-            if not p.skip
-            and p.trial.formulation.name not in ORACLES
-            and (cell := (p.trial.formulation, p.trial.solver)) not in fatal
-        )
-    )
-    if not cells or timing is None:
+    if not wanted or timing is None:
         return
-    scenarios = [
-        scenario
-        for scenario in map(parse_selector, study.scenarios)
-        if (not timing.scenarios or str(scenario) in timing.scenarios)
-        and any(timing_id(*cell, scenario) not in known for cell in cells)
-    ]
-    if not scenarios:
-        return
-    arguments = (cells, timing.reference, timing.problems, timing.rounds)
-    pairs = pairs_of(cells)
+    how = (timing.reference, timing.problems, timing.rounds)
     made = store.environment(described)
     with (
         workers(1, (time_scenario.__module__,)) as pool,
-        ProgressDisplay(len(scenarios), "timed scenarios") as display,
+        ProgressDisplay(len(wanted), "timed scenarios") as display,
     ):
         futures = {
             scenario: pool.schedule(
-                time_scenario, args=(scenario, study.seeds[0], *arguments), timeout=TIMING_TIMEOUT_S
+                time_scenario, args=(scenario, seed, cells, *how), timeout=TIMING_TIMEOUT_S
             )
-            for scenario in scenarios
+            for scenario, cells in wanted.items()
         }
         compared = {
             scenario: pool.schedule(
-                compare_with_peers,
-                args=(scenario, study.seeds[0], pairs),
-                timeout=TIMING_TIMEOUT_S,
+                compare_with_peers, args=(scenario, seed, pairs), timeout=TIMING_TIMEOUT_S
             )
-            for scenario in (scenarios if pairs else ())
+            for scenario, cells in wanted.items()
+            if (pairs := pairs_of(cells))
         }
         for scenario, future in futures.items():
             rows: list[TrialRow] = []
@@ -232,7 +212,7 @@ def _time(
             except Exception as error:  # a formulation may end the process: no times
                 reason = f"{type(error).__name__}: {error}".partition("\n")[0]
                 print(f"no times for {scenario}: {reason}", file=sys.stderr)
-            for cell, row in zip(cells, rows, strict=False):
+            for cell, row in zip(wanted[scenario], rows, strict=False):
                 named = {"id": timing_id(*cell, scenario), "environment": made}
                 store.record_times({**row, **named}, run)
             if scenario in compared:
@@ -275,15 +255,18 @@ def never_moved(out: Path) -> dict[str, str]:
 def status_of(out: Path) -> dict[str, int]:
     """Count the trials of the last study by status, and those that are missing.
 
+    A trial whose formulation or scenario family has changed since is missing. Nothing is drawn or
+    built for it, and nothing written.
+
     Raises:
         DikbenchError: if the folder holds no results.
     """
-    folder = ResultsFolder(out)
-    with folder.open_store() as store:
-        described, done = store.manifest(), store.statuses()
-    study = msgspec.convert(described["study"], Study)
-    counts: dict[str, int] = {}
-    for p in expand(study, partial(instances_in, folder)):
-        status = done.get(p.id, "missing")
-        counts[status] = counts.get(status, 0) + 1
-    return counts
+    with ResultsFolder(out).open_store() as store:
+        planned, number = store.planned(), int(store.manifest()["trials"])
+    cells = planned[TRIAL].itertuples(index=False, name=None)
+    counts: Counter[str] = Counter()
+    for name, status, cell in zip(planned["id"], planned["status"], cells, strict=True):
+        today = trial_id_today(dict(zip(TRIAL, cell, strict=True)))
+        counts[status if today in {None, name} else MISSING] += 1
+    counts[MISSING] += number - len(planned)
+    return dict(+counts)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import os
 import random
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from time import perf_counter_ns
@@ -26,22 +26,58 @@ from dikbench.problem.problem import (
 from dikbench.results.columns import CONTROL_RATES_HZ
 from dikbench.robots.kinematics import Kinematics
 from dikbench.run.trial_row import TrialRow, scenario_of, solve_of
+from dikbench.scenario.oracle import ORACLES
 from dikbench.scenario.plant import Ideal
 from dikbench.scenario.scenario import Scenario
 from dikbench.selector import Selector
 from dikbench.simulation.closed_loop import simulate
 from dikbench.simulation.control_step import TrialEnded, control_step
+from dikbench.simulation.status import Status
 from dikbench.solvers.checked_solve import CheckedSolve, make_solve
 from dikbench.statistics.stability import stability_of
+from dikbench.study.plan import PlannedTrial
+from dikbench.study.study import Study
 
 LEAD_IN_PROBLEMS: Final = 5
 """Problems that are solved before each timed segment, which fill the caches and warm starts."""
+
+FATAL_STATUSES: Final = frozenset(
+    status.value for status in (Status.TIMEOUT, Status.CRASHED, Status.OUT_OF_MEMORY)
+)
+"""Statuses of a trial after which its formulation is not timed."""
 
 Contender = tuple[Selector, Selector]
 """The selectors of a formulation and its solver."""
 
 TIME_PARTS: Final = ("whole", "own", "core", "wrapper")
 """The whole call of the formulation, its own code, the solver library, the library's wrapper."""
+
+
+def to_time(
+    study: Study, planned: Iterable[PlannedTrial], statuses: Mapping[str, str]
+) -> dict[Selector, list[Contender]]:
+    """List what is timed on each scenario: what the plan of a study runs on it.
+
+    Oracles are not timed, nor what ended its process in a trial: it would do so again, and lose all
+    times.
+
+    Args:
+        study: its `timing` may name the scenarios.
+        planned: its trials.
+        statuses: of those that have run, by id.
+    """
+    chosen = () if study.timing is None else study.timing.scenarios
+    found: dict[Selector, dict[Contender, None]] = {}
+    fatal = set()
+    for p in planned:
+        contender = p.trial.formulation, p.trial.solver
+        if statuses.get(p.id) in FATAL_STATUSES:
+            fatal.add(contender)
+        left_out = p.skip or p.trial.formulation.name in ORACLES
+        if not left_out and (not chosen or str(p.trial.scenario) in chosen):
+            found.setdefault(p.trial.scenario, {})[contender] = None
+    wanted = {scenario: [c for c in those if c not in fatal] for scenario, those in found.items()}
+    return {scenario: contenders for scenario, contenders in wanted.items() if contenders}
 
 
 @dataclass(frozen=True)

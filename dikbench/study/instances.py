@@ -65,13 +65,33 @@ def numbers_of(study: Study) -> range:
     return allowed[: max(1, round(study.instances * study.fraction))]
 
 
-def is_instance_of(study: Study, scenario: str, seed: int) -> bool:
-    """Say whether a scenario and its seed may be an instance of a study, by what it fixes."""
-    drawn = parse_selector(scenario)
-    return seed % SEEDS_APART in numbers_of(study) and any(
-        given.name == drawn.name and given.parameters.items() <= drawn.parameters.items()
-        for given in map(parse_selector, study.scenarios)
-    )
+def instances_among(
+    cells: Iterable[tuple[str, int]], study: Study, attempts: Sequence[Attempt]
+) -> set[tuple[str, int]]:
+    """Return which scenarios and seeds are instances of a study.
+
+    Args:
+        cells: scenarios and seeds.
+        study: with `instances`.
+        attempts: what was drawn for it; where nothing is known of it, those are returned that may
+            be instances by their number and what the study fixes.
+    """
+    numbers, given = numbers_of(study), [parse_selector(text) for text in study.scenarios]
+    if attempts:
+        names = {str(each) for each in given}
+        known = {
+            (each.scenario, each.seed)
+            for each in attempts
+            if each.given in names and each.number in numbers and not each.rejected
+        }
+        return known.intersection(cells)
+    drawn = {cell: parse_selector(cell[0]) for cell in cells if cell[1] % SEEDS_APART in numbers}
+    return {
+        cell
+        for cell, scenario in drawn.items()
+        for each in given
+        if each.name == scenario.name and each.parameters.items() <= scenario.parameters.items()
+    }
 
 
 def draw_instance(given: Selector, number: int) -> list[Attempt]:

@@ -65,13 +65,13 @@ class Cells(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class TimingSettings(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """The timing pass.
+    """The timing pass: a formulation is timed on the scenarios that its cells run.
 
     Attributes:
         reference: the formulation whose run gives the problems of each scenario.
         problems: number of contiguous problems, from the middle of the run.
         rounds: number of rounds in which they are solved.
-        scenarios: the scenarios of the study to time; empty: all.
+        scenarios: those of the study or its cells to time; empty: all.
     """
 
     reference: str

@@ -15,6 +15,7 @@ from dikbench.parameters import Drawn
 from dikbench.plugins.building import in_declared_order, make_formulation
 from dikbench.plugins.drawing import DIGITS, is_whole, scaled
 from dikbench.plugins.finding import formulation_plugin, plugins
+from dikbench.plugins.tuned import ranges_of
 from dikbench.selector import Selector
 
 MOST_POINTS_PER_CANDIDATE: Final = 4
@@ -22,20 +23,6 @@ MOST_POINTS_PER_CANDIDATE: Final = 4
 
 EDGE: Final = 0.03
 """A tuned value within this share of its range from an end is at the edge of it."""
-
-
-def ranges_of(selector: Selector) -> Mapping[str, Drawn]:
-    """Return the ranges of the parameters that are tuned: numbers that the selector leaves open.
-
-    Raises:
-        DikbenchError: if there is no such formulation.
-    """
-    parameters = formulation_plugin(selector.name).parameters
-    return {
-        name: parameter.drawn
-        for name, parameter in parameters.items()
-        if parameter.drawn is not None and parameter.numeric and name not in selector.parameters
-    }
 
 
 def tunable() -> list[Selector]:

@@ -11,8 +11,8 @@ import matplotlib.pyplot as plt
 
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_formulation
+from dikbench.plugins.tuned import ranges_of
 from dikbench.report.drawing.style import COLOURS, WIDTH, logarithmic, save, style
-from dikbench.tuning.candidates import ranges_of
 from dikbench.tuning.tuning import Tuning
 
 COLUMNS: Final = 4

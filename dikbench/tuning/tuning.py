@@ -16,7 +16,7 @@ from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_formulation
 from dikbench.plugins.finding import formulation_plugin
 from dikbench.plugins.source import source_digest
-from dikbench.plugins.tuned import Tuned, file_for, key_of, read_tuned
+from dikbench.plugins.tuned import Tuned, file_for, key_of, ranges_of, read_tuned
 from dikbench.problem.problem import program_of
 from dikbench.results.folder import ResultsFolder
 from dikbench.results.instances import read_attempts, write_attempts
@@ -27,7 +27,7 @@ from dikbench.scenario.oracle import ORACLE
 from dikbench.selector import Selector
 from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER
 from dikbench.study.study import Cells, Study, load_study
-from dikbench.tuning.candidates import candidates, ranges_of
+from dikbench.tuning.candidates import candidates
 from dikbench.tuning.judging import Gain, Scores, gain, scores
 
 TRAIN: Final = "train"

@@ -271,6 +271,25 @@ def test_drawn_bounds_outside_the_range_are_refused() -> None:
         Boundless()
 
 
+@pytest.mark.parametrize(
+    ("kind", "drawn", "told"),
+    [
+        (str, Drawn(), "value is a text; valid: a number, a Literal or a bool"),
+        (str | None, Drawn(0.0, 1.0), "value is a text or none; valid: a number"),
+        (bool, Drawn(0.0, 1.0), r"value is true or false, without bounds; valid: Drawn\(\)"),
+        (Literal["a", "b"], Drawn(1.0, 2.0), "value is a, b, without bounds"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused_where_it_is_declared(
+    kind: Any, drawn: Drawn, told: str
+) -> None:
+    """In one line that says what can be."""
+    made = dataclasses.make_dataclass("Made", [("value", Annotated[kind, drawn])], frozen=True)
+    with pytest.raises(DikbenchError, match=f"class Made: Drawn: {told}") as caught:
+        parameters_of(made)
+    assert "\n" not in str(caught.value)
+
+
 @dataclass(frozen=True)
 class Hidden(Parameters):
     """A type that is there for type checkers only."""
@@ -308,10 +327,10 @@ def test_what_families_declare_for_figures_are_numbers_of_theirs() -> None:
 
 
 def test_every_family_can_be_drawn() -> None:
-    """At least one parameter of each has bounds, but for those with one scenario per robot."""
+    """At least one parameter of each has bounds, but for the one that reads a file."""
     without = {
         name
         for name, plugin in plugins("scenario").items()
         if not any(parameter.drawn for parameter in plugin.parameters.values())
     }
-    assert without == {"back-and-forth", "csv"}
+    assert without == {"csv"}

@@ -13,7 +13,8 @@ import pytest
 CHECKOUT: Final = Path(__file__).parents[2]
 
 FIRST_LEVEL: Final = (
-    "arrays", "errors", "linear_algebra", "linear_inequalities", "parameters", "selector",
+    "annotations", "arrays", "errors", "linear_algebra", "linear_inequalities", "parameters",
+    "selector",
 )  # fmt: skip
 """Modules beside the rooms, the lowest floor."""
 

@@ -43,11 +43,27 @@ def test_it_is_the_published_trajectory(robot: str) -> None:
         assert X.rotation == pytest.approx(wanted.as_matrix())
 
 
+@pytest.mark.parametrize("robot", ["ur3", "panda", "lwr"])
+@pytest.mark.parametrize("size", [0.4, 0.9])
+def test_a_smaller_one_is_the_middle_of_the_same_path(robot: str, size: float) -> None:
+    """At sin^2 of (1 - size)/2 + size sin^2 t, of a known path and of the largest."""
+    whole, part = (
+        make_scenario(f"back-and-forth[robot={robot},size={share}]", 3).reference
+        for share in (1.0, size)
+    )
+    assert part.duration == whole.duration
+    pace = whole.duration / 10.0
+    for t in np.linspace(0.0, 3.0, 11):
+        there = np.arcsin(np.sqrt((1 - size) / 2 + size * np.sin(t) ** 2))
+        wanted = whole.placement(pace * there).homogeneous
+        assert part.placement(pace * t).homogeneous == pytest.approx(wanted, abs=1e-12)
+
+
 @pytest.mark.parametrize("seed", [0, 1])
-@pytest.mark.parametrize("robot", PUBLISHED)
-def test_velocity_is_the_derivative_of_the_placement(robot: str, seed: int) -> None:
+@pytest.mark.parametrize("given", [*PUBLISHED, "ur5,size=0.4", "xarm7,size=0.6"])
+def test_velocity_is_the_derivative_of_the_placement(given: str, seed: int) -> None:
     """The body twist, by central differences."""
-    reference, h = make_scenario(f"back-and-forth[robot={robot}]", seed).reference, 1e-5
+    reference, h = make_scenario(f"back-and-forth[robot={given}]", seed).reference, 1e-5
     for tau in (0.3, 0.8, 1.9, 4.4, 8.1):
         before, after = reference.placement(tau - h), reference.placement(tau + h)
         twist = pin.log6(before.actInv(after)).np / (2 * h)
@@ -110,8 +126,8 @@ def test_a_slow_sweep_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
         make_scenario("back-and-forth")
 
 
-@pytest.mark.parametrize("robot", PUBLISHED)
-def test_a_tenth_of_the_size_is_refused(robot: str, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("robot", [*PUBLISHED, "ur5,size=0.4"])
+def test_a_tenth_of_the_sweep_is_refused(robot: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A path that is no sweep any more: only the rotation is left of it."""
     module = sys.modules["scenarios.back_and_forth"]
     monkeypatch.setattr(module, "STOP_M", module.START_M + 0.1 * (module.STOP_M - module.START_M))
@@ -133,6 +149,7 @@ def test_errors_say_what_is_valid() -> None:
     """One line each."""
     for selector, words in (
         ("back-and-forth[robot=base]", "no sweep about the start of robot base can be followed"),
+        ("back-and-forth[size=0.1]", "size=0.1 must be 0.2 to 1"),
         ("back-and-forth[dt=-1]", "dt=-1.0 must be finite and above 0"),
     ):
         with pytest.raises(DikbenchError) as caught:

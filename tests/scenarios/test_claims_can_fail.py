@@ -45,7 +45,10 @@ VARIANTS: Mapping[str, tuple[str, ...]] = {
 
 ELSEWHERE: Mapping[str, set[str]] = {
     "joint-limit-crossing": {"its share in the least-norm motion"},
-    "joint-limit-approach": {"room before the limit over the braking distance"},
+    "joint-limit-approach": {
+        "room before the limit over the braking distance",
+        "its share in the least-norm motion",
+    },
     "start-outside": {"its share in the least-norm motion"},
     "obstacle": {"least distance of another motion that does it [m]"},
     "greedy-trap": {"end of the shortest way, past a limit at 0 [rad]"},

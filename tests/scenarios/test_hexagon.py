@@ -14,7 +14,8 @@ from dikbench.robots.loading import load_robot
 from dikbench.robots.robot import Robot
 from dikbench.scenario import Scenario
 
-ROBOTS = ("lwr", "planar4r")
+PUBLISHED = ("lwr", "planar4r")
+ROBOTS = (*PUBLISHED, "panda", "xarm7", "tiago")
 
 # In the order in which they are visited, as published, about the centre [m].
 CORNERS = {
@@ -57,7 +58,7 @@ def _way_to_the_top(scenario: Scenario) -> float:
     return float(np.linalg.norm(top - _position(scenario.robot, scenario.q0)))
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", PUBLISHED)
 def test_it_starts_as_published_and_visits_the_corners_in_order(robot: str) -> None:
     """Each 0.2 m after the other, twice round, and ends where it closes."""
     scenario = make_scenario(f"hexagon[robot={robot},speed=0.4]")
@@ -84,7 +85,7 @@ def test_the_speed_along_the_path_never_changes(robot: str) -> None:
 def test_only_the_position_is_tracked_and_the_start_moves_along(robot: str) -> None:
     """J v0 is the path's own velocity in the tracked rows, slower where that is too fast."""
     scenario = make_scenario(f"hexagon[robot={robot},speed=0.05]")
-    assert scenario.rows == ((0, 1, 2) if robot == "lwr" else (0, 1))
+    assert scenario.rows == ((0, 1) if robot == "planar4r" else (0, 1, 2))
     kinematics = Kinematics(scenario.robot)
     kinematics.update(scenario.q0)
     rows = list(scenario.rows)
@@ -149,7 +150,7 @@ def test_limits_that_it_does_not_reach_are_refused(
 @pytest.mark.parametrize(
     ("selector", "words"),
     [
-        ("hexagon[robot=ur5]", "valid: lwr, planar4r"),
+        ("hexagon[robot=ur5]", f"valid: {', '.join(ROBOTS)}"),
         ("hexagon[speed=3]", "speed=3.0 must be 0.05 to 2"),
         ("hexagon[laps=0]", "laps=0 must be 1 to 5"),
         ("hexagon[dt=0]", "dt=0.0 must be finite and above 0"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import sys
 from math import pi
 
@@ -49,10 +50,17 @@ def test_a_joint_that_the_null_space_spares_does_not_certify(
 
 # --- approach at speed
 
+SEVEN_JOINTS = ("panda", "xarm7", "tiago", "lwr")
+
 
 @pytest.mark.parametrize("joint", ["pan", "wrist_3"])
-@pytest.mark.parametrize("robot", ["ur3", "ur5", "ur10"])
-@pytest.mark.parametrize("deceleration", [2.0, 5.0, 20.0])
+@pytest.mark.parametrize(
+    ("robot", "deceleration"),
+    [
+        *itertools.product(("ur3", "ur5", "ur10"), (2.0, 5.0, 20.0)),
+        *((robot, 2.0) for robot in SEVEN_JOINTS),
+    ],
+)
 def test_an_approach_leaves_room_to_brake_and_no_more(
     robot: str, joint: str, deceleration: float
 ) -> None:
@@ -63,7 +71,8 @@ def test_an_approach_leaves_room_to_brake_and_no_more(
     scenario = make_scenario(
         f"joint-limit-approach[robot={robot},joint={joint},deceleration={deceleration}]"
     )
-    arm, j = scenario.robot, {"pan": 0, "wrist_3": 5}[joint]
+    arm = scenario.robot
+    j = {"pan": 0, "wrist_3": arm.nv - 1}[joint]
     position, velocity, acceleration = (
         arm.limits.position,
         arm.limits.velocity,
@@ -123,6 +132,29 @@ def test_an_approach_without_room_or_without_limit_does_not_certify(
     monkeypatch.setattr(module, "BRAKING_DISTANCES", 0.5)
     with pytest.raises(DikbenchError, match="room before the limit over the braking distance"):
         make_scenario("joint-limit-approach[deceleration=2]")
+
+
+@pytest.mark.parametrize("robot", SEVEN_JOINTS)
+def test_the_null_space_of_an_approach_spares_its_joints(robot: str) -> None:
+    """The null vector of the Jacobian has nothing of the first and the last joint, for any seed."""
+    for seed in range(4):
+        scenario = make_scenario(f"joint-limit-approach[robot={robot}]", seed)
+        kinematics = Kinematics(scenario.robot)
+        kinematics.update(scenario.q0)
+        null = np.linalg.svd(kinematics.jacobian(scenario.robot.frame_id))[2][-1]
+        assert null[0] ** 2 < 0.05
+        assert null[-1] ** 2 < 0.05
+
+
+def test_an_approach_that_the_null_space_spares_does_not_certify(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The Panda at its usual posture moves its base with the others."""
+    module = sys.modules["scenarios.joint_limit_approach"]
+    usual = {"panda": tuple(load_robot("panda").q0)}
+    monkeypatch.setattr(module, "POSTURES_RAD", usual)
+    with pytest.raises(DikbenchError, match="its share in the least-norm motion"):
+        make_scenario("joint-limit-approach[robot=panda]")
 
 
 # --- start outside
@@ -223,7 +255,10 @@ def test_a_trap_that_is_none_does_not_certify(monkeypatch: pytest.MonkeyPatch) -
     [
         ("joint-limit-approach[deceleration=1]", ["deceleration=1.0 must be 2 to 50"]),
         ("joint-limit-approach[joint=elbow]", ["joint='elbow' is not valid", "pan, wrist_3"]),
-        ("joint-limit-approach[robot=panda]", ["robot='panda' is not valid", "ur5, ur3, ur10"]),
+        (
+            "joint-limit-approach[robot=talos]",
+            ["robot='talos' is not valid", "ur5, ur3, ur10, panda, xarm7, tiago, lwr"],
+        ),
         ("start-outside[outside=0.1]", ["outside=0.1 must be 0.0001 to 0.01"]),
         ("start-outside[rate=-1]", ["rate=-1.0 must be 0 to 0.5"]),
         ("greedy-trap[goal=4]", ["goal=4.0 must be 4.9 to 6"]),

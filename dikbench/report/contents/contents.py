@@ -30,6 +30,7 @@ from dikbench.results.peers import read_peers
 from dikbench.results.reading import Results
 from dikbench.statistics.failures import SKIPPED, has_failed, ran
 from dikbench.statistics.trial_matrix import CONTENDER
+from dikbench.study.instances import Attempt
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +48,7 @@ class Contents:
         formulations: its formulations.
         limitations: what to keep in mind.
         figures: what was drawn.
+        attempts: the instances of the run, and what was rejected for them.
     """
 
     results: Results
@@ -59,6 +61,7 @@ class Contents:
     formulations: Sequence[FormulationOfRun]
     limitations: Sequence[Limitation]
     figures: Sequence[Figure]
+    attempts: Sequence[Attempt]
 
     @property
     def peers_note(self) -> str:
@@ -79,7 +82,7 @@ class Contents:
     def description(self) -> str:
         """What the study is, in a sentence; said to be its plan where not all of it was run."""
         text = str(self.manifest["study"].get("description", "")).strip()
-        if text and missing(self.results.trials, self.manifest):
+        if text and missing(self.results.trials, self.manifest, self.attempts):
             text = f"As it was planned: {text}"
         return text if text.endswith((".", "?", "!")) or not text else f"{text}."
 
@@ -99,7 +102,7 @@ class Contents:
             _of_plan(len(rows), int(self.manifest.get("trials", 0)), "trial run", "trials run"),
             (int(has_failed(trials).sum()), "failed"),
             (skipped, f"{'cell' if skipped == 1 else 'cells'} skipped"),
-            (missing(trials, self.manifest), "missing"),
+            (missing(trials, self.manifest, self.attempts), "missing"),
             _of_plan(
                 len(rows[CONTENDER].drop_duplicates()),
                 len(trials[CONTENDER].drop_duplicates()),
@@ -161,7 +164,8 @@ def gather(results: Results, figures: Sequence[Figure]) -> Contents:
         results: rows and manifest.
         figures: what was drawn of them.
     """
-    trials = results.trials
+    trials, attempts = results.trials, read_attempts(results.folder.path)
+    rejections = [Limitation(in_a_sentence(instances_table(attempts)))] if attempts else []
     return Contents(
         results,
         summarise(trials),
@@ -171,12 +175,7 @@ def gather(results: Results, figures: Sequence[Figure]) -> Contents:
         peers_table(read_peers(results.folder.path)),
         families_of(trials),
         formulations_of(trials),
-        [*limitations(trials, results.manifest, results.notes), *_rejections(results)],
+        [*limitations(trials, results.manifest, results.notes, attempts), *rejections],
         figures,
+        attempts,
     )
-
-
-def _rejections(results: Results) -> list[Limitation]:
-    """Say how many draws of instances were rejected, where some were drawn."""
-    attempts = read_attempts(results.folder.path)
-    return [Limitation(in_a_sentence(instances_table(attempts)))] if attempts else []

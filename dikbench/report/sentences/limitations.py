@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -20,7 +20,7 @@ from dikbench.solvers.catalogue.back_ends import BACK_ENDS, DEFAULT_SOLVER, is_i
 from dikbench.statistics.failures import SKIPPED, has_failed
 from dikbench.statistics.stability import STABLE
 from dikbench.statistics.trial_matrix import CONTENDER
-from dikbench.study.instances import is_instance_of
+from dikbench.study.instances import Attempt, instances_among
 from dikbench.study.plan import ways_of
 from dikbench.study.study import Study
 from dikbench.study.trial import NO_SOLVER
@@ -46,7 +46,10 @@ class Limitation:
 
 
 def limitations(
-    trials: pd.DataFrame, manifest: Mapping[str, Any], notes: Iterable[str]
+    trials: pd.DataFrame,
+    manifest: Mapping[str, Any],
+    notes: Iterable[str],
+    attempts: Sequence[Attempt] = (),
 ) -> list[Limitation]:
     """Everything to keep in mind.
 
@@ -54,9 +57,10 @@ def limitations(
         trials: the rows of trials.csv.
         manifest: the manifest.
         notes: what was found wrong when the results were read.
+        attempts: what was drawn for the study.
     """
     found = [Limitation(note) for note in notes]
-    found += _missing(trials, manifest)
+    found += _missing(trials, manifest, attempts)
     found += _times(trials)
     found += _seeds(trials)
     found += _ways(trials)
@@ -66,21 +70,25 @@ def limitations(
     return found
 
 
-def missing(trials: pd.DataFrame, manifest: Mapping[str, Any]) -> int:
+def missing(
+    trials: pd.DataFrame, manifest: Mapping[str, Any], attempts: Sequence[Attempt] = ()
+) -> int:
     """How many trials were planned and have no row."""
-    inside = int(in_plan(trials, manifest["study"]).sum())
+    inside = int(in_plan(trials, manifest["study"], attempts).sum())
     return max(0, int(manifest.get("trials", 0)) - inside)
 
 
-def _missing(trials: pd.DataFrame, manifest: Mapping[str, Any]) -> list[Limitation]:
+def _missing(
+    trials: pd.DataFrame, manifest: Mapping[str, Any], attempts: Sequence[Attempt]
+) -> list[Limitation]:
     """Trials without a row, and rows that the last study does not ask for."""
     found = []
-    if lacking := missing(trials, manifest):
+    if lacking := missing(trials, manifest, attempts):
         found.append(
             f"The run is not complete: {lacking} of {manifest['trials']} trials are missing; its "
             "command, given again, finishes it."
         )
-    if others := int((~in_plan(trials, manifest["study"])).sum()):
+    if others := int((~in_plan(trials, manifest["study"], attempts)).sum()):
         found.append(
             f"{several(others, 'row')} of earlier runs in this folder, which the last study does "
             "not ask for, are counted with the others."
@@ -88,8 +96,10 @@ def _missing(trials: pd.DataFrame, manifest: Mapping[str, Any]) -> list[Limitati
     return [Limitation(text) for text in found]
 
 
-def in_plan(trials: pd.DataFrame, study: Mapping[str, Any]) -> pd.Series:
-    """Which rows the study asks for; all of them where it does not say."""
+def in_plan(
+    trials: pd.DataFrame, study: Mapping[str, Any], attempts: Sequence[Attempt] = ()
+) -> pd.Series:
+    """Which rows the study asks for, given what was drawn; all of them where it does not say."""
     inside = np.zeros(len(trials), dtype=bool)
     for cell in study.get("cells") or [{}]:
         own = {axis: asked for axis in ("scenarios", "plants") if (asked := cell.get(axis))}
@@ -99,11 +109,11 @@ def in_plan(trials: pd.DataFrame, study: Mapping[str, Any]) -> pd.Series:
             of_cell = np.asarray(
                 trials["formulation"].isin(cell["formulations"]) & trials["solver"].isin(solvers)
             )
-        inside[of_cell] |= _asked(trials[of_cell], {**study, **own})
+        inside[of_cell] |= _asked(trials[of_cell], {**study, **own}, attempts)
     return pd.Series(inside, trials.index)
 
 
-def _asked(rows: pd.DataFrame, study: Mapping[str, Any]) -> Mask:
+def _asked(rows: pd.DataFrame, study: Mapping[str, Any], attempts: Sequence[Attempt]) -> Mask:
     """Say which rows of some formulations have the scenario and plant that a study asks for."""
     inside = pd.Series(True, rows.index)
     names = rows["formulation"].map(lambda text: parse_selector(text).name)
@@ -113,9 +123,9 @@ def _asked(rows: pd.DataFrame, study: Mapping[str, Any]) -> Mask:
             pairs = zip(names, rows[axis], strict=True)
             inside &= pd.Series([value in wanted[name] for name, value in pairs], rows.index)
     if study.get("instances"):
-        drawn = msgspec.convert(study, Study)
-        of_scenarios = zip(rows["scenario"], rows["seed"], strict=True)
-        inside &= pd.Series([is_instance_of(drawn, *cell) for cell in of_scenarios], rows.index)
+        cells = list(zip(rows["scenario"], rows["seed"], strict=True))
+        drawn = instances_among(set(cells), msgspec.convert(study, Study), attempts)
+        inside &= pd.Series([cell in drawn for cell in cells], rows.index)
     else:
         for axis in ("scenario", "seed"):
             if asked := study.get(f"{axis}s"):

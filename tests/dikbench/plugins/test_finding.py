@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import make_dataclass
 from functools import partial
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import pytest
 from makers.plugins import Install, law_with
 from makers.scenarios import error_of
 
+from dikbench.parameters import Drawn
 from dikbench.plugins.building import make_formulation, make_scenario
 from dikbench.plugins.finding import plugins, scenario_plugin
 from formulations.damped_least_squares import DampedLeastSquares
@@ -46,6 +48,24 @@ def test_the_parameters_that_an_instance_has_need_not_be_given(
     law: Any = make_formulation(law_with(tmp_path, "gain: float") + "[gain=2]")
     install("dikbench.formulations", theirs=_laws(ready=law))
     assert make_formulation("ready") == law
+
+
+@pytest.mark.parametrize(
+    ("kind", "base", "word"),
+    [("formulation", DampedLeastSquares, "tuned"), ("scenario", Reach, "seed")],
+)
+def test_a_parameter_whose_name_selectors_use_is_refused(
+    install: Install, kind: Literal["formulation", "scenario"], base: type, word: str
+) -> None:
+    """Where it is declared: no selector could give it a value."""
+    theirs = make_dataclass(
+        "Theirs", [(word, Annotated[bool, Drawn()], False)], bases=(base,), frozen=True
+    )
+    install(f"dikbench.{kind}s", theirs={"theirs": theirs})
+    told = error_of(plugins, kind)
+    assert f"{kind} 'theirs': a parameter cannot be called {word!r}" in told
+    assert "valid: another name" in told
+    assert "\n" not in told
 
 
 def test_a_table_may_hold_a_family_with_its_parameters_set(install: Install) -> None:

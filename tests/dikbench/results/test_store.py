@@ -22,15 +22,19 @@ from makers.runs import run_here, without_workers
 from makers.shared import made_once
 
 from dikbench.errors import DikbenchError
+from dikbench.plugins import building
 from dikbench.results.folder import ResultsFolder
+from dikbench.results.instances import INSTANCES
 from dikbench.results.reading import load_results
 from dikbench.results.store import Store
 from dikbench.run import runner
 from dikbench.run.in_workers import RunSettings
 from dikbench.run.runner import status_of, time_study
 from dikbench.run.trial_row import TracePolicy, run_trial
+from dikbench.study import instances, plan
 from dikbench.study.identity import timing_id, trial_id
 from dikbench.study.plan import PlannedTrial, expand
+from dikbench.study.selection import Selection, select
 from dikbench.study.study import Cells, Study, TimingSettings
 from dikbench.study.trial import Trial
 
@@ -257,7 +261,22 @@ def test_status_counts_done_failed_and_missing(undisturbed: Path, tmp_path: Path
     with sqlite3.connect(tmp_path / "results.sqlite") as database:
         database.execute("DELETE FROM trials WHERE formulation = 'dls'")
         database.execute("UPDATE trials SET status = 'crashed' WHERE formulation = 'qp'")
-    assert status_of(tmp_path) == {"missing": 2, "ok": 2, "crashed": 2}
+        database.execute("UPDATE trials SET id = 'other' || id WHERE formulation LIKE 'pinv%'")
+    assert status_of(tmp_path) == {"missing": 4, "crashed": 2}
+
+
+def test_status_draws_and_builds_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Instances that the folder does not know, or that were drawn of another source, neither."""
+    selection = Selection(formulations=("pinv",), scenarios=("reach[duration=0.1]",), instances=2)
+    study = select(STUDY, selection, named=False)
+    run_here(study, tmp_path, RunSettings(jobs=1, traces="none"), "a test")
+    (tmp_path / INSTANCES).unlink()
+    for where, name in ((instances, "draw"), (building, "make_scenario"), (plan, "make_scenarios")):
+        monkeypatch.setattr(where, name, None)
+    before = {file: file.stat().st_mtime_ns for file in tmp_path.iterdir()}
+    assert status_of(tmp_path) == {"ok": 2}
+    now = {file: file.stat().st_mtime_ns for file in tmp_path.iterdir()}
+    assert {f: t for f, t in now.items() if not f.name.endswith(("-shm", "-wal"))} == before
 
 
 def test_two_runs_in_one_folder_exclude_each_other(tmp_path: Path) -> None:

@@ -24,6 +24,8 @@ FOUND = [
     "obstacle[robot=lwr,where=elbow]",
     "hexagon[robot=planar4r]",
     "hexagon[robot=planar4r,speed=1.2]",
+    "hexagon[robot=panda,laps=1]",
+    "hexagon[robot=xarm7,laps=1,speed=1.2]",
 ]
 """Scenarios whose exact motion, if they have one, is no witness."""
 

@@ -11,9 +11,10 @@ from msgspec.structs import replace
 
 from dikbench.errors import DikbenchError
 from dikbench.report.sentences.limitations import in_plan
+from dikbench.run.timing import to_time
 from dikbench.study.plan import expand
 from dikbench.study.selection import Selection, select
-from dikbench.study.study import Study, load_study
+from dikbench.study.study import Study, TimingSettings, load_study
 
 TEXT = """
 description = "Two laws by themselves, one also with noise and with acceleration limits"
@@ -77,6 +78,23 @@ def test_what_is_selected_replaces_that_of_the_cells(study: Study) -> None:
     assert selected(Selection(scenarios=("step",))) == {
         (law, "step", plant) for law, scenario, plant in WANTED if scenario == "reach"
     }
+
+
+def test_a_law_is_timed_where_its_cells_run_it(study: Study) -> None:
+    """Once, whatever the plants; on the chosen scenarios, and not where it hung."""
+    timed, planned = replace(study, timing=TimingSettings("dls")), expand(study)
+    of = {str(s): [str(law) for law, _ in laws] for s, laws in to_time(timed, planned, {}).items()}
+    assert of == {
+        "reach": ["dls", "pinv"],
+        "reach[acceleration=true]": ["dls"],
+        "step[distance=0.1]": ["dls"],
+        "step[distance=0.2]": ["dls"],
+    }
+    chosen = replace(study, timing=TimingSettings("dls", scenarios=("reach", "step[distance=0.2]")))
+    assert set(map(str, to_time(chosen, planned, {}))) == {"reach", "step[distance=0.2]"}
+    hung = {p.id: "timeout" for p in planned if str(p.trial.scenario) == "step[distance=0.2]"}
+    (laws,) = to_time(timed, planned, hung).values()
+    assert [str(law) for law, _ in laws] == ["pinv"]
 
 
 def test_rows_of_every_cell_are_in_the_plan(study: Study) -> None:

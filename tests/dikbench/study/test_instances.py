@@ -7,15 +7,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
+import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from makers.rows import make_rows
+from msgspec import to_builtins
 from msgspec.structs import replace
 
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_family, make_scenario
 from dikbench.plugins.drawing import SEEDS_APART, drawn_cell, drawn_parameters, drawn_robots
 from dikbench.plugins.finding import plugins, scenario_plugin
+from dikbench.report.sentences import limitations
+from dikbench.report.sentences.limitations import in_plan
 from dikbench.report.tables.instances import instances_table
 from dikbench.results.folder import ResultsFolder
 from dikbench.results.instances import INSTANCES, read_attempts
@@ -28,6 +33,7 @@ from dikbench.study.instances import (
     draw,
     draw_instance,
     draw_missing,
+    instances_among,
     numbers_of,
 )
 from dikbench.study.plan import expand
@@ -312,6 +318,70 @@ def test_most_of_what_is_drawn_is_accepted(name: str) -> None:
     attempts: list[Attempt] = draw(parse_selector(name), range(100, 130))
     first = [each for each in attempts if each.seed < SEEDS_APART]
     assert sum(not each.rejected for each in first) >= len(first) / 2
+
+
+def test_what_was_drawn_is_known_from_the_attempts() -> None:
+    """Not what was rejected, has another number, or was drawn for another selector.
+
+    Without attempts, what may have been drawn.
+    """
+    study = _study(scenarios=("near-miss", "reach[robot=ur5]"), instances=4)
+    attempts = draw_missing(study)
+    known = {(a.scenario, a.seed) for a in attempts if not a.rejected}
+    others = {(a.scenario, a.seed) for a in attempts if a.rejected}
+    others |= {("near-miss[miss=0.02]", 101), ("reach[robot=ur5,distance=0.1,angle=0.3]", 101)}
+    others |= {(a.scenario, a.seed) for a in draw(parse_selector("near-miss"), [104])}
+    others |= {(a.scenario, a.seed) for a in draw(parse_selector("near-miss[robot=ur5]"), [101])}
+    assert len(known) == 8
+    assert instances_among(known | others, study, attempts) == known
+    maybe = instances_among({*known, ("step", 101), ("near-miss", 104)}, study, ())
+    assert maybe == known
+
+
+def test_each_instance_is_looked_up_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many rows have it."""
+    asked: list[set[tuple[str, int]]] = []
+    looked_up = instances_among
+
+    def counted(cells: Any, *more: Any) -> set[tuple[str, int]]:
+        asked.append(cells)
+        return looked_up(cells, *more)
+
+    monkeypatch.setattr(limitations, "instances_among", counted)
+    rows = make_rows({"pinv": {}, "dls": {}}, ("reach[robot=ur5]", "step"), seeds=(100, 101))
+    study = to_builtins(_study(instances=1, formulations=("pinv", "dls")))
+    assert list(in_plan(rows, study)) == [s == 100 and n != "step" for n, s in _cells(rows)]
+    assert [len(cells) for cells in asked] == [4, 4]
+
+
+def _cells(rows: pd.DataFrame) -> list[tuple[str, int]]:
+    return list(zip(rows["scenario"], rows["seed"], strict=True))
+
+
+FLAGGED = """
+from dataclasses import dataclass
+from typing import Annotated
+from dikbench.scenario import Drawn
+from scenarios.reach import Reach
+
+@dataclass(frozen=True, kw_only=True)
+class Flagged(Reach):
+    flag: Annotated[bool, Drawn()] = False
+"""
+
+
+def test_a_bool_is_drawn_evenly(tmp_path: Path) -> None:
+    """As a text of its value."""
+    file = tmp_path / "flagged.py"
+    file.write_text(FLAGGED)
+    given = Selector(f"{file}:Flagged", {"distance": "0.1"})
+    drawn = [drawn_cell(given, n)[0] for n in range(100, 500)]
+    counts = Counter(each.parameters["flag"] for each in drawn)
+    assert set(counts) == {"true", "false"}
+    assert abs(counts["true"] - 200) < 50  # five standard deviations
+    for each in drawn[:10]:
+        family: Any = make_family(each)
+        assert family.flag is (each.parameters["flag"] == "true")
 
 
 def test_what_is_fixed_at_its_default_is_fixed() -> None:

@@ -14,8 +14,9 @@ from dikbench.errors import DikbenchError
 from dikbench.parameters import Drawn
 from dikbench.plugins.building import make_formulation
 from dikbench.plugins.drawing import scaled
+from dikbench.plugins.tuned import ranges_of
 from dikbench.selector import Selector, parse_selector
-from dikbench.tuning.candidates import at_edge, candidates, ranges_of, share, tunable
+from dikbench.tuning.candidates import at_edge, candidates, share, tunable
 
 PICKY = """
 from dataclasses import dataclass

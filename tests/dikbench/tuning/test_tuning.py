@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import re
+import shlex
+import shutil
+import sqlite3
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import pandas as pd
@@ -13,8 +18,9 @@ from makers.runs import without_workers
 from dikbench.cli import commands
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import in_declared_order, make_formulation
-from dikbench.plugins.tuned import FILE, read_tuned
+from dikbench.plugins.tuned import FILE, ranges_of, read_tuned
 from dikbench.run.in_workers import RunSettings
+from dikbench.run.runner import Interrupted
 from dikbench.selector import parse_selector
 from dikbench.study.study import Cells, Study
 from dikbench.tuning import tuning
@@ -152,6 +158,66 @@ def test_what_cannot_be_tuned_is_one_line(arguments: list[str], told: str, tmp_p
     assert result.output.startswith(told)
     assert result.output.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("law", "told"),
+    [
+        ("neo[tuned]", "`dikbench tune --freeze neo` adds it"),
+        ("neo[tuned,damper_gain=1]", "`dikbench tune --freeze 'neo[damper_gain=1]'` adds it"),
+        ("dls[damping=0.1,tuned]", "it gives what tuning finds (damping); valid: dls[damping=0.1]"),
+        ("pinv[tuned,after=clip]", "it has no parameter to tune; valid: pinv[after=clip]"),
+        ("dls[tuned,dampng=1]", "did you mean 'damping'?"),
+    ],
+)
+def test_the_hint_of_what_is_not_tuned_is_a_command_that_works(
+    law: str, told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In a shell, or there is none."""
+    monkeypatch.setattr("dikbench.plugins.tuned.read_tuned", lambda file: {})
+    with pytest.raises(DikbenchError) as caught:
+        make_formulation(law)
+    assert told in str(caught.value)
+    commanded = re.findall("`(dikbench tune .*)`", str(caught.value))
+    assert [bool(ranges_of(parse_selector(shlex.split(each)[-1]))) for each in commanded] == [
+        True
+    ] * len(commanded)
+
+
+def test_a_trial_that_a_busy_machine_stopped_is_run_again_on_request(
+    tuned: tuple[Path, list[tuning.Tuning]], tmp_path: Path
+) -> None:
+    """`--rerun failed`, as of `dikbench run`; else it stays as it is."""
+    file, (found,) = tuned
+    law, out = parse_selector(f"{file}:Lazy"), tmp_path / "out"
+    shutil.copytree(file.with_name("out"), out)
+    database = out / found.name / "results.sqlite"
+    with sqlite3.connect(database) as store:
+        store.execute("UPDATE trials SET status = 'timeout' WHERE formulation NOT LIKE '%[%'")
+    left = []
+    for rerun in ("", "failed"):
+        settings = RunSettings(1, traces="none", rerun=rerun)
+        with without_workers():
+            (again,) = tuning.tune([law], STUDY, 4, 0, out, settings, "tune")
+        left.append(float(again.scores.success[0]))
+    assert left == [0.0, found.scores.success[0]]
+    assert found.scores.success[0] > 0
+
+
+@pytest.mark.parametrize("given", [[], ["--rerun", "failed"]])
+def test_rerun_reaches_the_runs(
+    given: list[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """As it is given on the command line."""
+    asked: list[RunSettings] = []
+
+    def stopped(*arguments: Any) -> None:
+        asked.append(arguments[5])
+        raise Interrupted("")
+
+    monkeypatch.setattr(tuning, "tune", stopped)
+    CliRunner().invoke(commands, ["tune", "dls", "--out", str(tmp_path), *given])
+    assert [each.rerun for each in asked] == [given[-1] if given else ""]
 
 
 def test_what_is_not_tuned_is_said(tmp_path: Path) -> None:

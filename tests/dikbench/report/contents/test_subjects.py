@@ -12,8 +12,10 @@ from dikbench.report.contents.contents import gather
 from dikbench.report.contents.docstring import parse_docstring
 from dikbench.report.contents.formulations_and_families import families_of, formulations_of
 from dikbench.report.pages.markdown_page import render_markdown
+from dikbench.results.instances import write_attempts
 from dikbench.results.reading import read_results, without_attributes
 from dikbench.scenario.situation import Situation
+from dikbench.study.instances import Attempt
 
 FORMULATION = '''
 raise SystemExit("this file was run")
@@ -150,6 +152,22 @@ def test_skipped_cells_are_no_trials_of_the_heading(tmp_path: Path) -> None:
     assert contents.counts[:3] == [
         (3, "of 4 planned trials run"), (1, "failed"), (1, "cell skipped"),
     ]  # fmt: skip
+
+
+def test_a_row_on_what_was_never_drawn_is_not_the_studys(tmp_path: Path) -> None:
+    """It has the number and the family of an instance; `instances.csv` knows it not."""
+    drawn, other = (f"reach[robot=ur5,distance={far},angle=0.2]" for far in (0.05, 0.06))
+    study = {
+        "name": "a", "description": "Two", "scenarios": ["reach"], "split": "test", "instances": 2,
+        "cells": [{"formulations": ["pinv"]}],
+    }  # fmt: skip
+    rows = make_rows({"pinv": {}}, (drawn, other), seeds=(100,))
+    folder = write_results(tmp_path / "out", rows, study=study, trials=2)
+    write_attempts(folder, [Attempt("reach", "0" * 16, 100, drawn, 100)])
+    said = gather(without_attributes(read_results(folder, lenient=True)), ())
+    assert (1, "missing") in said.counts
+    assert any(each.text.startswith("1 row of earlier runs") for each in said.limitations)
+    assert said.description == "As it was planned: Two."
 
 
 def test_the_heading_says_what_ran_and_what_was_planned_where_they_differ(tmp_path: Path) -> None:
