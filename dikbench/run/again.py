@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building_together import make_scenarios
@@ -11,9 +11,14 @@ from dikbench.results.columns import TRIAL
 from dikbench.run.trial_row import Prepared, prepare
 from dikbench.run.trials_together import in_lockstep, kind_of_trial
 from dikbench.scenario.scenario import Scenario
+from dikbench.selector import Selector
 from dikbench.simulation.closed_loop import Run, simulate
+from dikbench.simulation.status import Status
 from dikbench.study.identity import trial_id
 from dikbench.study.trial import Trial
+
+ENDED: Final = frozenset({Status.OK.value, Status.DIVERGED.value, Status.PROTECTIVE_STOP.value})
+"""Of trials that came to an end by themselves."""
 
 
 class RunAgain(NamedTuple):
@@ -30,12 +35,26 @@ class RunAgain(NamedTuple):
     run: Run
 
 
+def same_here(rows: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Choose the rows whose trials ended and are the same here: their plug-ins have the source."""
+    found = []
+    for row in rows:
+        try:
+            if row["status"] in ENDED and trial_id(_trial(row)) == row["id"]:
+                found.append(row)
+        except DikbenchError:
+            continue
+    return found
+
+
 def run_again(rows: Iterable[Mapping[str, Any]]) -> Iterator[RunAgain]:
     """Run the trials of rows of results again, those of one kind in lockstep.
 
-    Left out is what does not come to the same here: trials whose plug-ins are not found or have
-    another source, or whose run has another number of steps. Whoever asks must know that they end:
-    nothing limits their time.
+    Left out is what does not come to the same: trials that cannot be built, and those whose run has
+    another number of steps. Formulations can do what they like in this process.
+
+    Args:
+        rows: some of `same_here`.
     """
     groups: dict[object, list[tuple[Mapping[str, Any], Prepared]]] = {}
     for row, ready in _prepared(rows):
@@ -47,25 +66,26 @@ def run_again(rows: Iterable[Mapping[str, Any]]) -> Iterator[RunAgain]:
                 yield RunAgain(row["id"], ready.scenario, run)
 
 
+def _trial(row: Mapping[str, Any]) -> Trial:
+    return Trial.of(**{name: row[name] for name in TRIAL})
+
+
 def _prepared(rows: Iterable[Mapping[str, Any]]) -> Iterator[tuple[Mapping[str, Any], Prepared]]:
-    """Yield the rows whose trials are the same here, and what they consist of."""
-    known = []
-    for row in rows:
-        try:
-            trial = Trial.of(**{name: row[name] for name in TRIAL})
-            if trial_id(trial) == row["id"]:
-                known.append((row, trial))
-        except DikbenchError:
-            continue
-    cells = list(dict.fromkeys((trial.scenario, trial.seed) for _, trial in known))
-    built = dict(zip(cells, make_scenarios(cells), strict=True))
-    for row, trial in known:
-        scenario = built[trial.scenario, trial.seed]
-        if isinstance(scenario, BaseException):
-            continue
-        ready = prepare(trial, scenario)
-        if isinstance(ready, Prepared):
-            yield row, ready
+    """Yield the rows whose scenarios can be built, and what their trials consist of."""
+    trials = [(row, _trial(row)) for row in rows]
+    new = dict.fromkeys((trial.scenario, trial.seed) for _, trial in trials)
+    cells = [cell for cell in new if cell not in _BUILT]
+    _BUILT.update(zip(cells, make_scenarios(cells), strict=True))
+    for row, trial in trials:
+        scenario = _BUILT[trial.scenario, trial.seed]
+        if not isinstance(scenario, BaseException):
+            ready = prepare(trial, scenario)
+            if isinstance(ready, Prepared):
+                yield row, ready
+
+
+_BUILT: dict[tuple[Selector, int], Scenario | BaseException] = {}
+"""The scenarios of this process, for the formulations to come."""
 
 
 def _runs(ready: list[Prepared]) -> list[Run] | list[None]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -10,12 +10,15 @@ import pandas as pd
 
 from dikbench.arrays import Array, Indices
 from dikbench.metrics import motion_of
+from dikbench.plugins.built_scenarios import built
 from dikbench.report.interactive.chosen_runs import chosen_runs
-from dikbench.run.again import RunAgain, run_again
+from dikbench.run.again import RunAgain, run_again, same_here
+from dikbench.run.pool import available_cores, workers
+from dikbench.run.progress_display import ProgressDisplay
 from dikbench.scenario.scenario import Scenario
 from dikbench.viewer.limit_use import joint_nearness
 from dikbench.viewer.moving_joints import joint_coordinates
-from dikbench.viewer.static_scene import static_scene, surroundings
+from dikbench.viewer.static_scene import StaticScene, static_scene, surroundings
 from dikbench.viewer.target_poses import target_poses
 from dikbench.viewer.viser_client import client_html, has_viser
 
@@ -26,45 +29,75 @@ STEPS_PER_UNIT: Final = 1e4
 """What is embedded is rounded to 1e-4 (rad, m, 1)."""
 
 
+LONGEST_S: Final = 60.0
+"""For all runs of one formulation, which ended before: no more than a guard."""
+
+
 def make_replays(trials: pd.DataFrame, rows: pd.DataFrame) -> dict[str, Any]:
-    """Run the chosen trials of a page again and describe them for its script.
+    """Run the chosen trials of a page again, in processes of their own, and describe them.
 
     Returns:
-        runs: by id the index of its case, and the series of the run (see `_run`).
-        cases: of each scenario with its seed its robot's index, certificate and, with viser, what
-            surrounds the robot and the path of the target.
+        runs: by id, the place of the case and the series of the run (see `_run`).
+        cases: of each scenario with its seed the place of its robot, its certificate and, with
+            viser, what surrounds the robot and the path of the target.
         robots: the scenes (see `static_scene`), and client, viser's; both empty without viser.
     """
     seconds = trials.drop_duplicates("id").set_index("id")["control_time_s"].astype(float)
     wanted = trials[trials["id"].isin(chosen_runs(rows, seconds))]
-    found: list[Any] = wanted.to_dict("records")
-    return describe(run_again(found), drawn=has_viser())
-
-
-def describe(runs: Iterable[RunAgain], *, drawn: bool) -> dict[str, Any]:
-    """Describe runs, with their scenes where they are drawn (see `make_replays`)."""
-    found: dict[str, Any] = {}
-    cases: dict[int, tuple[int, dict[str, Any]]] = {}
-    robots: dict[tuple[str, str], tuple[int, Any]] = {}
-    kept: list[Scenario] = []  # so that their identities stay theirs
-    for each in runs:
-        scenario = each.scenario
-        if id(scenario) not in cases:
-            kept.append(scenario)
-            key = (scenario.robot.name, scenario.robot.frame)
-            if key not in robots:
-                scene = static_scene(scenario.robot) if drawn else None
-                robots[key] = (len(robots), scene)
-            cases[id(scenario)] = (len(cases), _case(scenario, robots[key][0], drawn=drawn))
-        found[each.id] = {"case": cases[id(scenario)][0], **_run(each)}
+    records: list[Any] = wanted.to_dict("records")
+    of_formulation: dict[str, list[Mapping[str, Any]]] = {}
+    for row in same_here(records):
+        of_formulation.setdefault(row["formulation"], []).append(row)
+    runs = _in_workers(list(of_formulation.values()))
+    cases: dict[tuple[str, int], tuple[int, dict[str, Any]]] = {}
+    robots: dict[tuple[str, str], StaticScene | None] = {}
+    drawn = has_viser()
+    for row in records:
+        if row["id"] not in runs:
+            continue
+        key = row["scenario"], int(row["seed"])
+        if key not in cases:
+            scenario = built(*key)
+            assert not isinstance(scenario, str)  # since it was, in a worker
+            robot = scenario.robot.name, scenario.robot.frame
+            if robot not in robots:
+                robots[robot] = static_scene(scenario.robot) if drawn else None
+            cases[key] = len(cases), _case(scenario, [*robots].index(robot), drawn=drawn)
+        runs[row["id"]]["case"] = cases[key][0]
     return {
-        "runs": found,
+        "runs": runs,
         "cases": [case for _, case in cases.values()],
         "robots": [
-            {"data": scene.data, "joints": scene.joints} for _, scene in robots.values() if scene
+            {"data": scene.data, "joints": scene.joints} for scene in robots.values() if scene
         ],
-        "client": client_html() if drawn and found else "",
+        "client": client_html() if drawn and runs else "",
     }
+
+
+def _in_workers(groups: Sequence[list[Mapping[str, Any]]]) -> dict[str, Any]:
+    """Describe the runs of groups of rows; a group that ends its process has none."""
+    found: dict[str, Any] = {}
+    if not groups:
+        return found
+    count = min(available_cores(), len(groups))
+    with (
+        workers(count, (described_runs.__module__,)) as pool,
+        ProgressDisplay(len(groups), "formulations to be replayed") as display,
+    ):
+        futures = [pool.schedule(described_runs, args=(g,), timeout=LONGEST_S) for g in groups]
+        for future in futures:
+            try:
+                found |= future.result()
+            except Exception:  # whatever a formulation does: the page names the command instead
+                continue
+            finally:
+                display.advance()
+    return found
+
+
+def described_runs(rows: list[Mapping[str, Any]]) -> dict[str, Any]:
+    """Run the trials of rows again and describe them, by id: the work of a process."""
+    return {each.id: _run(each) for each in run_again(rows)}
 
 
 def _case(scenario: Scenario, robot: int, *, drawn: bool) -> dict[str, Any]:
