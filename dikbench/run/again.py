@@ -7,6 +7,7 @@ from typing import Any, Final, NamedTuple
 
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building_together import make_scenarios
+from dikbench.plugins.finding import in_file
 from dikbench.results.columns import TRIAL
 from dikbench.run.trial_row import Prepared, prepare
 from dikbench.run.trials_together import in_lockstep, kind_of_trial
@@ -36,11 +37,17 @@ class RunAgain(NamedTuple):
 
 
 def same_here(rows: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Choose the rows whose trials ended and are the same here: their plug-ins have the source."""
+    """Choose the rows whose trials ended and are the same here: their plug-ins have the source.
+
+    Code in a file is left out: results may be from elsewhere, and what they name is not run.
+    """
     found = []
     for row in rows:
         try:
-            if row["status"] in ENDED and trial_id(_trial(row)) == row["id"]:
+            trial = _trial(row)
+            if row["status"] not in ENDED or in_file(trial.formulation.name):
+                continue
+            if not in_file(trial.scenario.name) and trial_id(trial) == row["id"]:
                 found.append(row)
         except DikbenchError:
             continue

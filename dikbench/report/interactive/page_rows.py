@@ -53,6 +53,8 @@ def page_rows(trials: pd.DataFrame) -> pd.DataFrame:
     facts = facts[~facts["formulation"].isin(ORACLES)]
     rows = pd.concat([counted(facts, setting) for setting in ("time", "path")])
     rows = rows[~rows.index.duplicated()].sort_index().reset_index(drop=True)
+    if rows.empty:
+        return rows
     names = names_of_contenders(rows)
     pairs = list(zip(rows["formulation"], rows["solver"], strict=True))
     variants = {text: variant(text) for text in rows["formulation"].unique()}
