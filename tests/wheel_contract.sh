@@ -12,6 +12,7 @@ trap 'rm -rf "$outside"' EXIT
 "$outside/venv/bin/pip" install --quiet -c "$checkout/constraints.txt" \
     "$outside"/dist/*.whl pytest hypothesis
 cp "$checkout/tests/formulations/test_contract.py" "$outside/"
+mkdir "$outside/makers" && cp "$checkout"/tests/makers/{__init__,few_states}.py "$outside/makers/"
 cd "$outside"
 venv/bin/python - <<'PY'
 import dikbench, formulations, scenarios
@@ -22,7 +23,7 @@ for package in (dikbench, formulations, scenarios):
 assert (Path(formulations.__file__).parent / "REFERENCES.md").is_file()
 PY
 venv/bin/dikbench list
-venv/bin/pytest --import-mode=importlib -o 'markers=long: takes minutes' -m 'not long' test_contract.py
+venv/bin/pytest --import-mode=importlib -o pythonpath=. -o 'markers=long: takes minutes' -m 'not long' test_contract.py
 venv/bin/dikbench run smoke --scenario reach --out runs/wheel > /dev/null
 test -s runs/wheel/report.md
 test -s runs/wheel/report.html
