@@ -9,13 +9,14 @@ from dikbench.report.tables.success import success_table
 
 
 def conclusions(trials: pd.DataFrame) -> list[str]:
-    """Return every sentence of the summary and every star of the table of success.
+    """Return every sentence of the summary, headlines too, and every star of the table of success.
 
     Args:
         trials: the rows of trials.csv.
     """
     summary, table = summarise(trials), success_table(trials)
     lines = [f"basis: {summary.basis}"]
+    lines += summary.headlines
     lines += [f"{finding.question}: {finding.text}" for finding in summary.short]
     for chapter in summary.chapters:
         lines += [f"{chapter.situation}: {each.question}: {each.text}" for each in chapter.findings]

@@ -10,10 +10,11 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.arrays import Array
-from dikbench.problem.constraints import Constraint, TorqueConstraint
+from dikbench.problem.constraints import CollisionConstraint, Constraint, TorqueConstraint
 from dikbench.problem.embedding import Embedding, Placements, embedding_of
 from dikbench.problem.tasks import Task, TrackingTask, TrackingTogether
 from dikbench.problem.tasks.task import check_rotation
+from dikbench.robots.collision.obstacles import Obstacle
 from dikbench.robots.robot import Robot
 from dikbench.scenario.certificate import Certificate
 from dikbench.scenario.held_frame import HeldFrame, held_frames
@@ -220,6 +221,16 @@ class Scenario:
     def limits_torques(self) -> bool:
         """Whether torque limits are a condition."""
         return any(isinstance(each, TorqueConstraint) for each in self.constraints)
+
+    @property
+    def obstacles(self) -> list[Obstacle]:
+        """The obstacles of all constraints."""
+        return [
+            obstacle
+            for constraint in self.constraints
+            if isinstance(constraint, CollisionConstraint)
+            for obstacle in constraint.obstacles
+        ]
 
     @cached_property
     def held_frames(self) -> tuple[HeldFrame, ...]:

@@ -10,11 +10,9 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.arrays import Array
-from dikbench.problem.constraints import CollisionConstraint
 from dikbench.robots.collision.obstacles import (
     BoxObstacle,
     CapsuleObstacle,
-    Obstacle,
     SphereObstacle,
 )
 from dikbench.robots.robot import Robot
@@ -152,7 +150,7 @@ def add_obstacles(
     scene: viser.SceneApi, scenario: Scenario, obstacles_node: str = OBSTACLES_NODE
 ) -> None:
     """Add the obstacles of a scenario."""
-    for number, obstacle in enumerate(obstacles_of(scenario)):
+    for number, obstacle in enumerate(scenario.obstacles):
         node = f"{obstacles_node}/{number}"
         _, placement = obstacle.geometry()
         at, turn = placement.translation, np.array(wxyz(placement.rotation))
@@ -166,16 +164,6 @@ def add_obstacles(
             _add_capsule(scene, node, obstacle, at, turn)
 
 
-def obstacles_of(scenario: Scenario) -> list[Obstacle]:
-    """List the obstacles of all constraints of a scenario."""
-    return [
-        obstacle
-        for constraint in scenario.constraints
-        if isinstance(constraint, CollisionConstraint)
-        for obstacle in constraint.obstacles
-    ]
-
-
 def path_points(scenario: Scenario) -> Array:
     """Compute points of the path of the target, (k, 3) [m]; one where it stands still."""
     reference = scenario.reference
@@ -186,7 +174,7 @@ def path_points(scenario: Scenario) -> Array:
 def obstacle_points(scenario: Scenario) -> Array:
     """Return points (k, 3) [m] at the edge of the obstacles of a scenario."""
     found = [np.empty((0, 3))]
-    for obstacle in obstacles_of(scenario):
+    for obstacle in scenario.obstacles:
         shape, placement = obstacle.geometry()
         shape.computeLocalAABB()
         away = min(float(shape.aabb_radius), FARTHEST_EDGE_M)

@@ -15,6 +15,8 @@ from dikbench.problem import (
     LinearizedJointTask,
     LinearizedPose,
     Parameters,
+    ProblemPart,
+    ProgramKind,
 )
 from formulations.peers.models import has_plain_joints
 
@@ -78,6 +80,30 @@ class Peer(Parameters):
             velocity: its velocity, (nv,); None where it has none.
         """
         return ""
+
+
+@dataclass(frozen=True)
+class PosedPeer(Peer):
+    """A peer that poses a program of a frame task with its placement, and of posture tasks.
+
+    Attributes:
+        limits: the peer's own or the problem's.
+        solver: the peer's own or the trial's.
+    """
+
+    limits: Whose = "own"
+    solver: Whose = "own"
+
+    sees: ClassVar[frozenset[ProblemPart]] = frozenset({"postures", "weights"})
+
+    @property
+    def program(self) -> ProgramKind | None:
+        """What it hands to the trial's solver, if it does."""
+        return "qp" if self.solver == "ours" else None
+
+    def refuses(self, problem: DikProblem) -> str:
+        """See `Peer`."""
+        return no_pose(problem) or super().refuses(problem)
 
 
 def is_outside(problem: DikProblem) -> bool:

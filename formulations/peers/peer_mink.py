@@ -16,8 +16,6 @@ from dikbench.problem import (
     DikProblem,
     Interval,
     LimitKind,
-    ProblemPart,
-    ProgramKind,
     Robot,
     Solve,
 )
@@ -25,10 +23,9 @@ from formulations.peers.models import TOOL, check_same, coordinates, position_li
 from formulations.peers.peer import (
     IN_DISPLACEMENTS,
     WITH_PEERS,
-    Peer,
+    PosedPeer,
     Whose,
     is_outside,
-    no_pose,
     passes_by_tolerance,
     pose_of,
     postures_of,
@@ -42,7 +39,7 @@ IDENTITY_BELOW: Final = 1e-5
 
 
 @dataclass(frozen=True)
-class PeerMink(Peer):
+class PeerMink(PosedPeer):
     """mink itself: `mink.solve_ik` on MuJoCo, a frame task, a posture task for each joint task.
 
     The model is MuJoCo's, from a URDF of the robot. The frame task is mink's, with its derivative
@@ -58,12 +55,8 @@ class PeerMink(Peer):
     Source: [Mink], solve_ik.
     """
 
-    limits: Whose = "own"
-    solver: Whose = "own"
-
     requires: ClassVar[Mapping[str, str]] = MappingProxyType({"mink": WITH_PEERS})
     package: ClassVar[str] = "mink"
-    sees: ClassVar[frozenset[ProblemPart]] = frozenset({"postures", "weights"})
 
     @property
     def counterpart(self) -> str:
@@ -71,19 +64,10 @@ class PeerMink(Peer):
         return "mink-qp"
 
     @property
-    def program(self) -> ProgramKind | None:
-        """What it hands to the trial's solver, if it does."""
-        return "qp" if self.solver == "ours" else None
-
-    @property
     def keeps(self) -> frozenset[LimitKind]:
         """The limits of the problem, where it is told of them."""
         kept: frozenset[LimitKind] = frozenset({"position", "velocity"})
         return kept if self.limits == "ours" else frozenset()
-
-    def refuses(self, problem: DikProblem) -> str:
-        """See `Peer`."""
-        return no_pose(problem) or super().refuses(problem)
 
     def known_difference(self, problem: DikProblem, velocity: Array | None) -> str:
         """See `Peer`."""

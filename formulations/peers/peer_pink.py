@@ -16,8 +16,6 @@ from dikbench.problem import (
     Array,
     DikProblem,
     LimitKind,
-    ProblemPart,
-    ProgramKind,
     QuadraticProgram,
     Robot,
     Solve,
@@ -26,10 +24,9 @@ from formulations.peers.models import check_same
 from formulations.peers.peer import (
     IN_DISPLACEMENTS,
     WITH_PEERS,
-    Peer,
+    PosedPeer,
     Whose,
     is_outside,
-    no_pose,
     passes_by_tolerance,
     pose_of,
     postures_of,
@@ -39,7 +36,7 @@ from formulations.peers.same_limits import as_modelled
 
 
 @dataclass(frozen=True)
-class PeerPink(Peer):
+class PeerPink(PosedPeer):
     """Pink itself: `pink.solve_ik` with a frame task and a posture task for each joint task.
 
     The frame task is Pink's, with its derivative of the logarithm, but for its error, which is
@@ -55,12 +52,8 @@ class PeerPink(Peer):
     Source: [Pink] 4.4, solve_ik.
     """
 
-    limits: Whose = "own"
-    solver: Whose = "own"
-
     requires: ClassVar[Mapping[str, str]] = MappingProxyType({"pink": WITH_PEERS})
     package: ClassVar[str] = "pin-pink"
-    sees: ClassVar[frozenset[ProblemPart]] = frozenset({"postures", "weights"})
 
     @property
     def counterpart(self) -> str:
@@ -68,19 +61,10 @@ class PeerPink(Peer):
         return "pink-qp"
 
     @property
-    def program(self) -> ProgramKind | None:
-        """What it hands to the trial's solver, if it does."""
-        return "qp" if self.solver == "ours" else None
-
-    @property
     def keeps(self) -> frozenset[LimitKind]:
         """The limits of the problem, where it is told of them."""
         kept: frozenset[LimitKind] = frozenset({"position", "velocity", "acceleration"})
         return kept if self.limits == "ours" else frozenset()
-
-    def refuses(self, problem: DikProblem) -> str:
-        """See `Peer`."""
-        return no_pose(problem) or super().refuses(problem)
 
     def known_difference(self, problem: DikProblem, velocity: Array | None) -> str:
         """See `Peer`."""

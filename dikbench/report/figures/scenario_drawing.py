@@ -10,10 +10,8 @@ import numpy as np
 
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_scenario
-from dikbench.problem.constraints import CollisionConstraint
 from dikbench.report.drawing.obstacle_surface import surface
 from dikbench.report.drawing.style import COLOURS, style
-from dikbench.robots.collision.obstacles import Obstacle
 from dikbench.robots.stick_figure import stick
 from dikbench.scenario.scenario import Scenario
 
@@ -81,7 +79,7 @@ def _draw_way(axes: Any, scenario: Scenario, planar: bool) -> None:
             linewidth=2.6 - 0.35 * number,
             label=f"robot at {time:.2f} s",
         )
-    surfaces = [surface(obstacle) for obstacle in _obstacles(scenario)]
+    surfaces = [surface(obstacle) for obstacle in scenario.obstacles]
     for shape in surfaces:
         axes.plot_surface(*np.moveaxis(shape, 2, 0), color=COLOURS[5], alpha=0.5)
     shapes = [shape.reshape(-1, 3) for shape in surfaces]
@@ -95,15 +93,6 @@ def _draw_way(axes: Any, scenario: Scenario, planar: bool) -> None:
     else:
         axes.set_box_aspect((1, 1, 1))
     axes.legend(loc="upper left")
-
-
-def _obstacles(scenario: Scenario) -> list[Obstacle]:
-    return [
-        obstacle
-        for constraint in scenario.constraints
-        if isinstance(constraint, CollisionConstraint)
-        for obstacle in constraint.obstacles
-    ]
 
 
 def _draw_difficulty(panels: list[Any], scenario: Scenario) -> None:

@@ -24,26 +24,28 @@ OTHER: Final = "#8a8f98"
 CHOSEN: Final = "#B4468F"
 BAD: Final = "#C8502B"
 
+NAMED: Final = alt.Tooltip("contender:N", title="formulation")
+"""What a mark says first."""
+
 ROW_PX: Final = 20
 OVERALL_PX: Final = 170
 SITUATION_PX: Final = 126
 BAR_SHARE: Final = 0.74
 """Of a situation's width; its number takes the rest."""
 
-_AT: Final = (
-    "toNumber(slice(datum.outcomes,{place}+(limits=='kept'?0:{half}),"
-    "1+{place}+(limits=='kept'?0:{half})))"
-)
-_HALF: Final = 1 + len(TOLERANCES_M)
+
+def category_at(tolerance: str) -> str:
+    """Return the expression for the category of a row at the place of a tolerance."""
+    place = f"{tolerance}+(limits=='kept'?0:{1 + len(TOLERANCES_M)})"
+    return f"toNumber(slice(datum.outcomes,{place},1+{place}))"
 
 
-def counted_rows(controls: Sequence[Control], place: str = "toNumber(tolerance)") -> alt.Chart:
+def counted_rows(controls: Sequence[Control]) -> alt.Chart:
     """Take the rows that the controls leave, with their category and whether they succeed."""
-    category = _AT.format(place=place, half=_HALF)
     return (
         alt.Chart(alt.NamedData(name=ROWS))
         .transform_filter(filter_of(controls))
-        .transform_calculate(category=category)
+        .transform_calculate(category=category_at("toNumber(tolerance)"))
         .transform_calculate(done="datum.category==0?1:0")
     )
 
@@ -52,20 +54,33 @@ def weighted(rows: alt.Chart, *within: str) -> alt.Chart:
     """Weigh the rows of each law: families alike, then robots, scenarios and what is below.
 
     It adds `w`, which sums to 1 for each law (and each value of `within`), as
-    `statistics.success.hierarchical_weights` does.
+    `statistics.success.hierarchical_weights` does; `rate`, the share of success in it; `trials`,
+    their number; and `whole`, whether no other law has more of them.
     """
-    law: list[Any] = ["law", *within]
+    of_each: list[Any] = ["contender", *within]
     return (
-        rows.transform_joinaggregate(families="distinct(family)", groupby=law)
-        .transform_joinaggregate(robots="distinct(robot)", groupby=[*law, "family"])
-        .transform_joinaggregate(scenarios="distinct(scenario)", groupby=[*law, "family", "robot"])
-        .transform_joinaggregate(cases="count()", groupby=[*law, "family", "robot", "scenario"])
+        rows.transform_joinaggregate(families="distinct(family)", groupby=of_each)
+        .transform_joinaggregate(robots="distinct(robot)", groupby=[*of_each, "family"])
+        .transform_joinaggregate(
+            scenarios="distinct(scenario)", groupby=[*of_each, "family", "robot"]
+        )
+        .transform_joinaggregate(cases="count()", groupby=[*of_each, "family", "robot", "scenario"])
         .transform_calculate(
             w="1/(datum.families*datum.robots*datum.scenarios*datum.cases)",
             done_w="datum.done/(datum.families*datum.robots*datum.scenarios*datum.cases)",
         )
-        .transform_joinaggregate(rate="sum(done_w)", trials="count()", groupby=law)
+        .transform_joinaggregate(rate="sum(done_w)", trials="count()", groupby=of_each)
+        .transform_joinaggregate(most_trials="max(trials)", groupby=list[Any](within))
+        .transform_calculate(whole="datum.trials==datum.most_trials?1:0")
     )
+
+
+def comparable(rows: alt.Chart) -> alt.Chart:
+    """Weigh rows (see `weighted`) and leave out the laws that did not run every trial of the view.
+
+    Who refuses what is difficult succeeds in the rest: its numbers are of other trials.
+    """
+    return weighted(rows).transform_filter("datum.whole==1")
 
 
 def ranked(controls: Sequence[Control]) -> alt.Chart:
@@ -78,27 +93,28 @@ def ranked(controls: Sequence[Control]) -> alt.Chart:
     """
     return (
         weighted(counted_rows(controls))
-        .transform_joinaggregate(most="max(trials)")
-        .transform_calculate(whole="datum.trials==datum.most?1:0")
         .transform_aggregate(
             s="mean(done)", w="sum(w)", rate="max(rate)", trials="max(trials)", whole="max(whole)",
-            groupby=["law", "family", "robot", "scenario"],
+            groupby=["contender", "family", "robot", "scenario"],
         )
         .transform_joinaggregate(count="distinct(scenario)")
-        .transform_calculate(against="versus=='best'?datum.whole*10+datum.rate:datum.law==versus?1:0")
+        .transform_calculate(
+            against="versus=='best'?datum.whole*10+datum.rate:datum.contender==versus?1:0"
+        )
         .transform_window(
-            base="first_value(s)", rival="first_value(law)",
-            sort=[alt.SortField("against", "descending"), alt.SortField("law")],
+            base="first_value(s)", rival="first_value(contender)",
+            sort=[alt.SortField("against", "descending"), alt.SortField("contender")],
             groupby=["scenario"], frame=[None, None],
         )
         .transform_calculate(w="versus=='best'||datum.rival==versus?datum.w:0")
         .transform_calculate(d="datum.s-datum.base", wd="datum.w*(datum.s-datum.base)")
-        .transform_joinaggregate(sum_wd="sum(wd)", sum_w="sum(w)", groupby=["law"])
+        .transform_joinaggregate(sum_wd="sum(wd)", sum_w="sum(w)", groupby=["contender"])
         .transform_calculate(w="datum.w/datum.sum_w", difference="datum.sum_wd/datum.sum_w")
         .transform_calculate(v="pow(datum.w*(datum.d-datum.difference),2)")
         .transform_aggregate(
             rate="max(rate)", trials="max(trials)", whole="max(whole)", count="max(count)",
-            difference="max(difference)", variance="sum(v)", rival="max(rival)", groupby=["law"],
+            difference="max(difference)", variance="sum(v)", rival="max(rival)",
+            groupby=["contender"],
         )
         .transform_calculate(half=f"{DEVIATIONS}*sqrt(datum.variance)")
         .transform_calculate(
@@ -113,7 +129,7 @@ def ranked(controls: Sequence[Control]) -> alt.Chart:
             tied="datum.whole==1&&datum.enough==1&&datum.rate>0"
             "&&datum.lower<=0&&datum.upper>=0?1:0"
         )
-        .transform_joinaggregate(laws="count()")
+        .transform_joinaggregate(contenders="count()")
         .transform_window(
             rank="rank()", dense="dense_rank()", sort=[alt.SortField("rounded", "descending")]
         )
@@ -121,7 +137,7 @@ def ranked(controls: Sequence[Control]) -> alt.Chart:
             place="datum.whole==0||datum.enough==0||datum.rate==0?null:datum.rank",
             apart="datum.whole==0||datum.enough==0?'':datum.tied==1?'no':'yes'",
         )
-        .transform_filter("datum.dense<=toNumber(most)||datum.law==versus")
+        .transform_filter("datum.dense<=toNumber(most)||datum.contender==versus")
     )  # fmt: skip
 
 
@@ -132,10 +148,10 @@ def matrix(controls: Sequence[Control], situations: Sequence[str]) -> Any:
                      labelPadding=6, title=None)  # fmt: skip
     scale = alt.Scale(domain=[0, 1.42], nice=False)
     rates = ranked(controls).transform_calculate(sorted="datum.rounded", zero="0")
-    y = alt.Y("law:N", axis=lines, sort=by_success)
+    y = alt.Y("contender:N", axis=lines, sort=by_success)
     colour = alt.condition("datum.tied==1", alt.value(GOOD), alt.value(OTHER))
     tooltip = [
-        alt.Tooltip("law:N"),
+        NAMED,
         alt.Tooltip("rate:Q", format=".1%", title="success"),
         alt.Tooltip("difference:Q", format="+.1%", title="difference"),
         alt.Tooltip("rival:N", title="to"),
@@ -172,20 +188,17 @@ def matrix(controls: Sequence[Control], situations: Sequence[str]) -> Any:
 def _situations(controls: Sequence[Control], situations: Sequence[str], by_success: Any) -> Any:
     """Draw the bars of outcomes, and the rate of success at the end of each."""
     scale = alt.Scale(domain=[0, len(situations)], nice=False)
-    overall = (
-        weighted(counted_rows(controls))
-        .transform_joinaggregate(most="max(trials)")
-        .transform_calculate(sorted="(datum.trials==datum.most?1e7:0)+round(1e6*datum.rate)")
-        .transform_calculate(law_rate="datum.rate")
+    overall = weighted(counted_rows(controls)).transform_calculate(
+        sorted="datum.whole*1e7+round(1e6*datum.rate)"
     )
     shares = (
         weighted(overall, "situation")
         .transform_aggregate(
             share="sum(w)", n="count()", trials="max(trials)", rate="max(rate)",
-            sorted="max(sorted)", groupby=["law", "situation", "category"],
+            sorted="max(sorted)", groupby=["contender", "situation", "category"],
         )
         .transform_stack(
-            stack="share", as_=["a", "b"], groupby=["law", "situation"],
+            stack="share", as_=["a", "b"], groupby=["contender", "situation"],
             sort=[alt.SortField("category")],
         )
         .transform_calculate(
@@ -197,9 +210,9 @@ def _situations(controls: Sequence[Control], situations: Sequence[str], by_succe
             left=f"datum.column+{BAR_SHARE}*datum.a", right=f"datum.column+{BAR_SHARE}*datum.b"
         )
         .transform_window(dense="dense_rank()", sort=[alt.SortField("negative")])
-        .transform_filter("datum.dense<=toNumber(most)||datum.law==versus")
+        .transform_filter("datum.dense<=toNumber(most)||datum.contender==versus")
     )  # fmt: skip
-    y = alt.Y("law:N", axis=None, sort=by_success)
+    y = alt.Y("contender:N", axis=None, sort=by_success)
     bars = shares.mark_bar(
         height={"band": 0.72}, cursor="pointer", stroke="currentColor", strokeWidth=0.4,
         strokeOpacity=0.5,
@@ -216,14 +229,14 @@ def _situations(controls: Sequence[Control], situations: Sequence[str], by_succe
             ),
         ),
         tooltip=[
-            alt.Tooltip("law:N"), alt.Tooltip("situation:N"), alt.Tooltip("outcome:N"),
+            NAMED, alt.Tooltip("situation:N"), alt.Tooltip("outcome:N"),
             alt.Tooltip("share:Q", format=".0%"), alt.Tooltip("n:Q", title="trials"),
             alt.Tooltip("trials:Q", title="of"),
         ],
     )  # fmt: skip
     numbers = (
         shares.transform_aggregate(
-            rate="max(rate)", sorted="max(sorted)", groupby=["law", "situation", "column"]
+            rate="max(rate)", sorted="max(sorted)", groupby=["contender", "situation", "column"]
         )
         .transform_calculate(x="datum.column+0.93", text="format(100*datum.rate,'.0f')")
         .mark_text(align="right", fontSize=11, color="currentColor")
@@ -241,7 +254,7 @@ def _situations(controls: Sequence[Control], situations: Sequence[str], by_succe
 PALETTE: Final = (
     GOOD, "#6FA8DC", "#F9E7B0", "#E8A33D", BAD, "#4B0082", "#BFC9D1", "#111111",
 )  # fmt: skip
-"""Colours of `CATEGORIES`: told apart by the colour-blind too, side by side."""
+"""Colours of `CATEGORIES`, in their order."""
 
 
 def _heading(texts: Sequence[tuple[str, float]], scale: alt.Scale) -> Any:

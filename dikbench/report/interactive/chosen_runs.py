@@ -18,9 +18,10 @@ LONGEST_S: Final = 0.4
 CASE: Final = ["scenario", "seed", "plant", "reference"]
 
 RULE: Final = (
-    "The page carries, on the first plant and with the first solver of each formulation, its "
-    "worst run in every situation and, where the path may wait, its median one; then the same "
-    "cases under the other formulations, as far as there is room."
+    "The page carries, on the ideal plant (or the first) and with the first solver of each "
+    "formulation, its worst run in every situation and, where the path may wait, its median one; "
+    "then the same cases under the other formulations; all of it as far as there is room, and "
+    "without runs that take long to be computed again."
 )
 
 
@@ -38,7 +39,9 @@ def chosen_runs(rows: pd.DataFrame, seconds: pd.Series) -> list[str]:
         ["category", "farthest"], kind="stable", na_position="last"
     )
     marked = set[str]()
-    for (_, _, reference), runs in order.groupby(["law", "situation", "reference"], sort=False):
+    for (_, _, reference), runs in order.groupby(
+        ["contender", "situation", "reference"], sort=False
+    ):
         ids = runs["id"].tolist()
         marked |= {ids[-1]} if reference == "time" else {ids[-1], ids[(len(ids) - 1) // 2]}
     carries = order["id"].isin(marked)

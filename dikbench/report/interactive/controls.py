@@ -13,6 +13,9 @@ from dikbench.report.interactive.page_rows import TOLERANCES_M
 from dikbench.report.selection.judged import DEFINITIONS, IN_WORDS
 
 ANY: Final = "any"
+ANY_OF: Final[tuple[tuple[str, ...], ...]] = ((), (ANY,))
+"""What stands beside the values of a list: nothing where there is one, else any of them."""
+
 ONE_EACH: Final = "one each"
 PERIODS_US: Final = {"100 Hz": 10000, "200 Hz": 5000, "500 Hz": 2000, "1 kHz": 1000, "2 kHz": 500,
                      "5 kHz": 200, "10 kHz": 100}  # fmt: skip
@@ -53,7 +56,7 @@ def controls(rows: pd.DataFrame) -> list[Control]:
     situations = [each for each in DEFINITIONS if each in set(rows["situation"])]
     references = [each for each in IN_WORDS if each in set(rows["reference"])]
     variants = set(rows["variant"])
-    laws = _found(rows, "law")
+    laws = _found(rows, "contender")
     own = "the scenario's own"
     tolerances = [own, *(f"{1e3 * tolerance:g} mm" for tolerance in TOLERANCES_M)]
     found = [
@@ -62,12 +65,15 @@ def controls(rows: pd.DataFrame) -> list[Control]:
             "0", slider=True,
         ),
         _list("limits", "Limits", [("kept", "must be kept"), ("broken", "may be broken")]),
-        _list("reference", "Reference", [*((each, IN_WORDS[each]) for each in references), ANY],
+        _list("reference", "Reference", [*((each, IN_WORDS[each]) for each in references),
+              *ANY_OF[len(references) > 1]],
               test="reference=='any'||datum.reference==reference||datum.reference=='rest'"),
-        _list("situation", "Situation", [ANY, *situations],
+        _list("situation", "Situation", [*ANY_OF[len(situations) > 1], *situations],
               test="situation=='any'||datum.situation==situation"),
-        _list("robot", "Robot", [ANY, *robots], test="robot=='any'||datum.robot==robot"),
-        _list("plant", "Plant", [*sorted(plants, key=lambda each: each != "ideal"), ANY],
+        _list("robot", "Robot", [*ANY_OF[len(robots) > 1], *robots],
+              test="robot=='any'||datum.robot==robot"),
+        _list("plant", "Plant", [*sorted(plants, key=lambda each: each != "ideal"),
+              *ANY_OF[len(plants) > 1]],
               test="plant=='any'||datum.plant==plant"),
         _list("rate", "Rate", [(ANY, ANY), *((str(us), f"{text}: {us} us") for text, us in
               PERIODS_US.items())],
@@ -91,7 +97,7 @@ def phase_controls(rows: pd.DataFrame) -> list[Control]:
     grids = [grid for grid in _found(rows, "grid") if grid]
     if not grids:
         return []
-    laws = _found(rows[rows["grid"].ne("")], "law")
+    laws = _found(rows[rows["grid"].ne("")], "contender")
     quantities = [("success", "success"), ("error", "rms distance [mm]"),
                   ("peak", "peak speed over limit")]  # fmt: skip
     return [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -12,14 +13,12 @@ import pandas as pd
 from dikbench.errors import DikbenchError
 from dikbench.metrics import Judgement, Outcome
 from dikbench.plugins.drawing import drawn_parameters
-from dikbench.plugins.finding import formulation_plugin
+from dikbench.plugins.finding import formulation_plugin, in_file
 from dikbench.plugins.tuned import file_for, key_of, read_tuned
-from dikbench.report.drawing.style import contender_name
+from dikbench.report.figures.formulation_sweeps import formulation_sweeps
 from dikbench.report.selection.categories import CATEGORIES
 from dikbench.report.selection.phase_grids import phase_grids
 from dikbench.report.selection.rows import names_of_contenders
-from dikbench.report.selection.sweeps import number
-from dikbench.results.selected import parameters_of
 from dikbench.scenario.oracle import ORACLES
 from dikbench.selector import Selector, parse_selector
 from dikbench.statistics.success import counted, with_facts
@@ -30,24 +29,26 @@ TOLERANCES_M: Final = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05)
 AT_REST: Final = "rest"
 """The reference of a target at rest, which neither waits nor moves on."""
 
-SHOWN: Final[Mapping[str, tuple[str, float]]] = {
-    "error": ("contour_error_6d_rms_m", 1e3),
-    "farthest": ("contour_error_6d_max_m", 1e3),
-    "slow": ("slow_down", 1.0),
-    "peak": ("velocity_peak_ratio", 1.0),
-}
+SHOWN: Final[Mapping[str, tuple[str, float]]] = MappingProxyType(
+    {
+        "error": ("contour_error_6d_rms_m", 1e3),
+        "farthest": ("contour_error_6d_max_m", 1e3),
+        "slow": ("slow_down", 1.0),
+        "peak": ("velocity_peak_ratio", 1.0),
+    }
+)
 """Of each number of a row: the column it is of, and its factor (to mm)."""
 
 
 def page_rows(trials: pd.DataFrame) -> pd.DataFrame:
     """Make the rows of the page: a trial that counts in a setting each (see `counted`).
 
-    Its columns are id, law (the formulation, with its solver where it has several), formulation,
-    solver, interface, first (1 for the first solver of a formulation), variant and is_tuned (see
-    `variant`), scenario, seed, family, situation, plant, reference (`AT_REST` where the target
-    rests), robot, outcomes (see `_outcomes`), the numbers of `SHOWN`, deadline (the largest 99th
-    percentile of the formulation's time in a timed scenario [us]), grid, across, up (its place in
-    a phase diagram), swept, value (the parameter of the formulation that is swept).
+    Its columns are id, contender (the formulation, with its solver where it has several),
+    formulation, solver, interface, first (1 for the first solver of a formulation), variant and
+    is_tuned (see `variant`), scenario, seed, family, situation, plant, reference (`AT_REST` where
+    the target rests), robot, outcomes (see `_outcomes`), the numbers of `SHOWN`, deadline (see
+    `_slowest_steps` [us]), grid, across, up (its place in a phase diagram), swept, value (the
+    parameter of the formulation that is swept).
     """
     facts = with_facts(trials)
     facts = facts[~facts["formulation"].isin(ORACLES)]
@@ -63,7 +64,7 @@ def page_rows(trials: pd.DataFrame) -> pd.DataFrame:
     found = pd.DataFrame(
         {
             "id": rows["id"],
-            "law": [names[pair] for pair in pairs],
+            "contender": [names[pair] for pair in pairs],
             "formulation": rows["formulation"],
             "solver": rows["solver"],
             "interface": [interface_of(solver) for solver in rows["solver"]],
@@ -85,7 +86,7 @@ def page_rows(trials: pd.DataFrame) -> pd.DataFrame:
         }
     )
     found["is_tuned"] = found["variant"].isin(["tuned", "both"]).astype(int)
-    found["deadline"] = _slowest_times(trials).reindex(pairs).to_numpy()
+    found["deadline"] = _slowest_steps(trials).reindex(pairs).to_numpy()
     return found.join(_grid_places(rows)).join(_swept(rows))
 
 
@@ -101,16 +102,20 @@ def variant(formulation: str) -> str:
 
     Returns:
         default, tuned, both (where there is nothing to tune, or tuning found nothing better) or
-        other. What is not known here is taken as it stands: default without parameters.
+        other. What is not known here, and code in a file, which a report does not run, is default
+        without parameters.
     """
     selector = parse_selector(formulation)
+    untold = "other" if selector.parameters else "default"
+    if in_file(selector.name):
+        return untold
     try:
         plugin = formulation_plugin(selector.name)
         tunable = drawn_parameters(plugin, Selector(selector.name))
         switches = {k: v for k, v in selector.parameters.items() if k not in tunable}
         tuned = read_tuned(file_for(selector)).get(key_of(Selector(selector.name, switches)))
     except DikbenchError:
-        return "default" if not selector.parameters else "other"
+        return untold
     given = {k: v for k, v in selector.parameters.items() if k in tunable}
     at_defaults = all(value == tunable[k].default for k, value in given.items())
     if not tunable:
@@ -146,18 +151,26 @@ def _outcomes(rows: pd.DataFrame) -> list[str]:
     return found
 
 
-def _slowest_times(trials: pd.DataFrame) -> pd.Series:
-    """Return the largest p99 time [us] of each formulation and solver over the timed scenarios."""
-    times = pd.to_numeric(trials["formulation_time_p99_us"])
-    found: pd.Series = times.groupby([trials["formulation"], trials["solver"]]).max()
+def _slowest_steps(trials: pd.DataFrame) -> pd.Series:
+    """Return the time of a step [us] of each formulation and solver, by which it is done in time.
+
+    It is the 99th percentile of its own, and the median of the kinematics (of a peer, which has its
+    own, 0), the largest of the timed scenarios.
+    """
+    own, kinematics = (
+        pd.to_numeric(trials[f"{name}_us"])
+        for name in ("formulation_time_p99", "kinematics_time_median")
+    )
+    found: pd.Series = (
+        (own + kinematics.fillna(0.0)).groupby([trials["formulation"], trials["solver"]]).max()
+    )
     return found
 
 
 def _grid_places(rows: pd.DataFrame) -> pd.DataFrame:
     """Return the phase diagram of each row, and its place in it (see `phase_grids`)."""
     places: dict[str, tuple[str, float, float]] = {}
-    names = rows.assign(contender=[*map(contender_name, rows["formulation"], rows["solver"])])
-    for grid in phase_grids(names):
+    for grid in phase_grids(rows):
         named = f"{grid.family}[{grid.others}]: {grid.up} over {grid.across}"
         for scenario, x, y in zip(
             grid.rows["scenario"], grid.rows["across"], grid.rows["up"], strict=True
@@ -168,26 +181,18 @@ def _grid_places(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def _swept(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return the parameter of which each row's formulation has one value of at least three."""
+    """Return the parameter of each row's formulation that is swept, and its value."""
     values: dict[str, tuple[str, float]] = {}
-    groups: dict[tuple[str, str], dict[str, float]] = {}
-    for formulation, parameters in parameters_of(rows, "formulation").items():
-        for name, given in parameters.items():
-            if (value := number(given)) is not None and len(parameters) == 1:
-                key = (parse_selector(formulation).name, name)
-                groups.setdefault(key, {})[formulation] = value
-    for (formulation, name), found in groups.items():
-        if len(set(found.values())) >= FEWEST_VALUES:
-            values |= {text: (f"{formulation}: {name}", value) for text, value in found.items()}
+    for sweep in formulation_sweeps(rows):
+        others = f"[{sweep.others}]" if sweep.others else ""
+        named = f"{sweep.formulation}{others}: {sweep.parameter}"
+        for formulation, value in zip(sweep.rows["formulation"], sweep.rows["value"], strict=True):
+            values[formulation] = (named, value)
     return pd.DataFrame(
         [values.get(text, ("", np.nan)) for text in rows["formulation"]],
         columns=["swept", "value"],
         index=rows.index,
     )
-
-
-FEWEST_VALUES: Final = 3
-"""Fewer values of a parameter show no sensitivity."""
 
 
 def as_columns(rows: pd.DataFrame) -> dict[str, Any]:

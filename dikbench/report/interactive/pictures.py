@@ -8,7 +8,16 @@ from typing import Any, Final
 
 import altair as alt
 
-from dikbench.report.interactive.charts import BAD, CHOSEN, GOOD, OTHER, counted_rows, weighted
+from dikbench.report.interactive.charts import (
+    BAD,
+    CHOSEN,
+    GOOD,
+    NAMED,
+    OTHER,
+    category_at,
+    comparable,
+    counted_rows,
+)
 from dikbench.report.interactive.controls import Control
 from dikbench.report.interactive.page_rows import TOLERANCES_M
 
@@ -23,21 +32,21 @@ LEAST_RATE: Final = 0.3
 
 def _colours() -> Any:
     """Colour the law that the others are relative to."""
-    return alt.condition("datum.law==versus", alt.value(CHOSEN), alt.value(GOOD))
+    return alt.condition("datum.contender==versus", alt.value(CHOSEN), alt.value(GOOD))
 
 
 def cost(controls: Sequence[Control]) -> Any:
-    """Draw distance from the path against slow-down: medians over the trials that succeed.
+    """Draw distance from the path against slow-down: medians over a law's own successes.
 
     Relative to a law, over the trials in which both succeed, as ratios.
     """
     common = "versus=='best'||(isValid(datum.error_of)&&isValid(datum.slow_of))"
     found = (
-        weighted(counted_rows(controls))
+        comparable(counted_rows(controls))
         .transform_filter("datum.done==1&&isValid(datum.error)&&isValid(datum.slow)")
         .transform_calculate(
-            of_error="datum.law==versus?datum.error:null",
-            of_slow="datum.law==versus?datum.slow:null",
+            of_error="datum.contender==versus?datum.error:null",
+            of_slow="datum.contender==versus?datum.slow:null",
         )
         .transform_joinaggregate(error_of="max(of_error)", slow_of="max(of_slow)", groupby=_CASE)
         .transform_filter(common)
@@ -46,24 +55,25 @@ def cost(controls: Sequence[Control]) -> Any:
             y="versus=='best'?datum.slow:datum.slow/datum.slow_of",
         )
         .transform_aggregate(
-            x="median(x)", y="median(y)", rate="max(rate)", n="count()", groupby=["law"]
+            x="median(x)", y="median(y)", rate="max(rate)", n="count()", groupby=["contender"]
         )
-        .transform_filter(f"datum.rate>={LEAST_RATE}||datum.law==versus")
+        .transform_filter(f"datum.rate>={LEAST_RATE}||datum.contender==versus")
     )
-    return _scatter(found, "rms distance from the path, median [mm], or ratio",
-                    "slow-down, median, or ratio", "What accuracy costs", "cost")  # fmt: skip
+    x = "rms distance, median of its own successes [mm], or ratio"
+    y = "slow-down, median likewise, or ratio"
+    return _scatter(found, x, y, "What accuracy costs", "cost")
 
 
 def deadline(controls: Sequence[Control]) -> Any:
-    """Draw success against the 99th percentile of the time, with the deadline of the rate."""
+    """Draw success against the time of a control step, with the deadline of the rate."""
     found = (
-        weighted(counted_rows(controls))
+        comparable(counted_rows(controls))
         .transform_aggregate(
-            x="max(deadline)", y="max(rate)", rate="max(rate)", n="count()", groupby=["law"]
+            x="max(deadline)", y="max(rate)", rate="max(rate)", n="count()", groupby=["contender"]
         )
         .transform_filter("isValid(datum.x)&&datum.x>0")
     )
-    points = _scatter(found, "p99 of the formulation's time, largest of the timed scenarios [us]",
+    points = _scatter(found, "time of a step, p99, largest of the timed scenarios [us]",
                       "success", "What success costs", "deadline", log_y=False)  # fmt: skip
     line = (
         alt.Chart(alt.InlineData([{}]))
@@ -78,7 +88,7 @@ def deadline(controls: Sequence[Control]) -> Any:
 
 
 def _scatter(found: alt.Chart, x: str, y: str, title: str, name: str, *, log_y: bool = True) -> Any:
-    """Draw a point for each law, named where there is room."""
+    """Draw a point for each law, larger where it succeeds more often."""
     across = alt.X("x:Q", title=x, scale=alt.Scale(type="log", nice=False, padding=14))
     scale = alt.Scale(type="log", nice=False, padding=12) if log_y else alt.Scale(domain=[0, 1])
     return (
@@ -87,7 +97,7 @@ def _scatter(found: alt.Chart, x: str, y: str, title: str, name: str, *, log_y: 
             across, alt.Y("y:Q", title=y, scale=scale), color=_colours(),
             size=alt.Size("rate:Q", scale=alt.Scale(domain=[0, 1], range=[12, 240]), legend=None),
             tooltip=[
-                alt.Tooltip("law:N"), alt.Tooltip("x:Q", format=".3~g"),
+                NAMED, alt.Tooltip("x:Q", format=".3~g"),
                 alt.Tooltip("y:Q", format=".3~g"), alt.Tooltip("rate:Q", format=".0%",
                 title="success"), alt.Tooltip("n:Q", title="trials"),
             ],
@@ -101,22 +111,18 @@ def profile(controls: Sequence[Control]) -> Any:
     millimetres = json.dumps([1e3 * tolerance for tolerance in TOLERANCES_M])
     places: list[Any] = [f"at{k}" for k in range(1, 1 + len(TOLERANCES_M))]
     rows = counted_rows(controls).transform_calculate(
-        **{
-            place: f"slice(datum.outcomes,{k}+(limits=='kept'?0:{len(places) + 1}),"
-            f"1+{k}+(limits=='kept'?0:{len(places) + 1}))=='0'?1:0"
-            for k, place in enumerate(places, start=1)
-        }
+        **{place: f"{category_at(str(k))}==0?1:0" for k, place in enumerate(places, start=1)}
     )
-    by_scenario = weighted(rows).transform_calculate(
+    by_scenario = comparable(rows).transform_calculate(
         **{place: f"datum.w*datum.{place}" for place in places}
     )
     found = (
         by_scenario.transform_aggregate(
             **dict[Any, Any]({place: f"sum({place})" for place in places}),
-            rate="max(rate)", n="count()", groupby=["law"],
+            rate="max(rate)", n="count()", groupby=["contender"],
         )
         .transform_window(dense="dense_rank()", sort=[alt.SortField("rate", "descending")])
-        .transform_filter("datum.dense<=toNumber(most)||datum.law==versus")
+        .transform_filter("datum.dense<=toNumber(most)||datum.contender==versus")
         .transform_fold(places, as_=["place", "success"])
         .transform_calculate(millimetres=f"{millimetres}[toNumber(slice(datum.place,2))-1]")
     )  # fmt: skip
@@ -124,9 +130,9 @@ def profile(controls: Sequence[Control]) -> Any:
         alt.X("millimetres:Q", title="tolerance [mm]", scale=alt.Scale(type="log", nice=False),
               axis=alt.Axis(values=[1e3 * t for t in TOLERANCES_M], format="~g")),
         alt.Y("success:Q", title="success", scale=alt.Scale(domain=[0, 1])),
-        detail="law:N",
-        color=alt.condition("datum.law==versus", alt.value(CHOSEN), alt.value(OTHER)),
-        tooltip=[alt.Tooltip("law:N"), alt.Tooltip("millimetres:Q", title="tolerance [mm]"),
+        detail="contender:N",
+        color=alt.condition("datum.contender==versus", alt.value(CHOSEN), alt.value(OTHER)),
+        tooltip=[NAMED, alt.Tooltip("millimetres:Q", title="tolerance [mm]"),
                  alt.Tooltip("success:Q", format=".1%"), alt.Tooltip("n:Q", title="trials")],
     )  # fmt: skip
     return lines.properties(
@@ -146,7 +152,7 @@ def phase(controls: Sequence[Control], across: str, up: str) -> Any:
     """
     found = (
         counted_rows([each for each in controls if each.name not in {"variant", "solver"}])
-        .transform_filter("datum.law==phase&&datum.grid==grid")
+        .transform_filter("datum.contender==phase&&datum.grid==grid")
         .transform_aggregate(
             success="mean(done)", error="median(error)", peak="max(peak)", n="count()",
             groupby=["across", "up"],
@@ -181,14 +187,15 @@ def sensitivity(controls: Sequence[Control]) -> Any:
     """Draw success against the parameter of a formulation, whatever `variant` chooses."""
     free = [each for each in controls if each.name != "variant"]
     found = (
-        weighted(counted_rows(free).transform_filter("datum.swept!=''"))
+        comparable(counted_rows(free).transform_filter("datum.swept!=''"))
         .transform_aggregate(
-            rate="max(rate)", n="count()", tuned="max(is_tuned)", groupby=["law", "swept", "value"]
+            rate="max(rate)", n="count()", tuned="max(is_tuned)",
+            groupby=["contender", "swept", "value"],
         )
     )  # fmt: skip
     x = alt.X("value:Q", title="parameter", scale=alt.Scale(type="log", nice=False, padding=14))
     y = alt.Y("rate:Q", title="success", scale=alt.Scale(domain=[0, 1]))
-    tooltip = [alt.Tooltip("law:N"), alt.Tooltip("rate:Q", format=".1%", title="success"),
+    tooltip = [NAMED, alt.Tooltip("rate:Q", format=".1%", title="success"),
                alt.Tooltip("n:Q", title="trials")]  # fmt: skip
     lines = found.mark_line(color=GOOD).encode(x, y, detail="swept:N")
     points = found.mark_circle(size=60, cursor="pointer", opacity=1).encode(

@@ -28,7 +28,6 @@ INSTANTS: Final = 150
 STEPS_PER_UNIT: Final = 1e4
 """What is embedded is rounded to 1e-4 (rad, m, 1)."""
 
-
 LONGEST_S: Final = 60.0
 """For all runs of one formulation, which ended before: no more than a guard."""
 
@@ -119,10 +118,9 @@ def _run(again: RunAgain) -> dict[str, Any]:
         dt: control period [s]; step: numbers of the instants, ascending; joints: their coordinates
         (see `joint_coordinates`) and target: x, y, z [m] and the quaternion, both as differences
         from instant to instant in units of 1e-4, column by column; near: for each instant a digit
-        per joint (see `joint_nearness`); error: distance to the target,
-        a rotation counted at 0.2 m [mm]; speed: the
-        largest over its limit; margin: the smallest to a position limit [deg; 57.3 per m where a
-        joint slides]; null where there is no limit.
+        per joint (see `joint_nearness`); error: distance to the target, a rotation counted at
+        0.2 m [mm]; speed: the largest since the instant before over its limit; margin: the smallest
+        to a position limit [deg; 57.3 per m where a joint slides]; null where there is no limit.
     """
     trace, scenario = again.run.trace, again.scenario
     steps = np.unique(np.linspace(0, trace.steps, min(INSTANTS, trace.steps + 1)).astype(int))

@@ -54,10 +54,10 @@ def make_charts(rows: pd.DataFrame) -> Charts:
     if rows["swept"].ne("").any():
         pictures.append(sensitivity(asked))
     tables = [
-        ranked(asked).mark_text(fontSize=0).encode(text="law:N").properties(
+        ranked(asked).mark_text(fontSize=0).encode(text="contender:N").properties(
             width=1, height=1, name="ranking"
         ),
-        counted_rows(asked).transform_filter("datum.law==picked").mark_text(fontSize=0).encode(
+        counted_rows(asked).transform_filter("datum.contender==picked").mark_text(fontSize=0).encode(
             text="id:N"
         ).properties(width=1, height=1, name="trials"),
     ]  # fmt: skip

@@ -93,7 +93,7 @@ def leaders(
     if too_few(part) and found.rate[rivals].max(initial=0.0) > 0:
         text = (
             f"success of {cases_in_words(part)}: too few to say who is first ({FEWEST_SCENARIOS} "
-            f"scenarios are asked for); the candidates have {_range(found.rate[rivals])}."
+            f"scenarios are asked for); the candidates have {range_of(found.rate[rivals])}."
         )
         return Leaders((), False, found, Finding(f"Too few cases where {IN_WORDS[setting]}", text))
     first, may_lead = places(part, found, rivals)
@@ -105,7 +105,7 @@ def leaders(
         question = "The only candidate"
         said = _with_shares([(every[k], found.rate[k]) for k in order], names)
     elif (first == rivals).all():
-        question, much = "Nobody stands out", _range(found.rate[first])
+        question, much = "Nobody stands out", range_of(found.rate[first])
         said = f"all {len(order)} candidates have {much}"
         said += ", not told apart" if " to " in much else ""
     else:
@@ -123,34 +123,6 @@ def leaders(
     text = f"success of {cases_in_words(part)}: {said}{_pace(part, setting, may_lead, found)}."
     contenders = tuple(every[k] for k in order)
     return Leaders(contenders, alone, found, Finding(f"{question} where {IN_WORDS[setting]}", text))
-
-
-def headline(leading: Leaders, setting: Setting, cases: int, names: Names) -> str:
-    """Say in a line who succeeds most in a situation; empty where nobody can be named.
-
-    Args:
-        leading: who is first there, or may be.
-        setting: of the rows.
-        cases: how many count.
-        names: how formulations are called.
-    """
-    if not leading.contenders:
-        return ""
-    rate_of = dict(
-        zip(
-            leading.found.contenders.itertuples(index=False, name=None),
-            map(float, leading.found.rate),
-            strict=True,
-        )
-    )
-    most = max(rate_of[contender] for contender in leading.contenders)
-    best = [each for each in leading.contenders if rate_of[each] >= most - ROUNDING]
-    others = np.array([rate_of[each] for each in leading.contenders if each not in best])
-    said = f"{IN_WORDS[setting]}: {names.of(best)} with {number(100 * most)} % of {cases} cases"
-    if len(others):
-        more = f"{len(others)} {'more' if len(others) > 1 else 'other'}"
-        said += f"; {more} ({_range(others)}) not told apart"
-    return f"{said}."
 
 
 def _with_shares(of: Sequence[tuple[Contender, float]], names: Names) -> str:
@@ -182,13 +154,13 @@ def _as_good(
     ]
     if not who:
         return ""
-    stopped = _range(np.array([barred[contender] for contender in who]))
+    stopped = range_of(np.array([barred[contender] for contender in who]))
     return (
         f"; as successful, but no candidate (stopped in {stopped} of all trials): {names.of(who)}"
     )
 
 
-def _range(rates: Array) -> str:
+def range_of(rates: Array) -> str:
     """Say from which to which rate some go [%]."""
     low, high = number(100 * float(rates.min())), number(100 * float(rates.max()))
     return f"{high} %" if low == high else f"{low} to {high} %"

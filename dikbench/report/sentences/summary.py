@@ -18,11 +18,11 @@ from dikbench.report.sentences.findings import (
     broke_off,
     fastest,
     first_most_often,
-    headline,
     leaders,
     most_accurate,
     unanswered,
 )
+from dikbench.report.sentences.headline import headline
 from dikbench.report.sentences.words import Names, several
 from dikbench.scenario.oracle import ORACLES
 from dikbench.scenario.situation import Situation

@@ -33,7 +33,6 @@ from dikbench.study.trial import Trial
 from dikbench.viewer.legend import COLOURS, PATH_COLOURS, names_of
 from dikbench.viewer.limit_use import Nearness, joint_nearness
 from dikbench.viewer.moving_joints import joint_nodes
-from dikbench.viewer.nodes import obstacles_of
 from dikbench.viewer.recording import Recording, find_recording
 from dikbench.viewer.replay import write_replay
 from dikbench.viewer.static_scene import surroundings
@@ -276,7 +275,7 @@ def test_what_stands_in_the_way_and_what_is_carried(tmp_path: Path) -> None:
     film = Film.of(page)
     scenario, trace = recordings[0].scenario, recordings[0].trace
     distances = motion_of(trace, scenario).distances
-    (obstacle,) = obstacles_of(scenario)
+    (obstacle,) = scenario.obstacles
     assert isinstance(obstacle, CapsuleObstacle | SphereObstacle)
     _, placement = obstacle.geometry()
     for time in (0.0, film.times[-1]):

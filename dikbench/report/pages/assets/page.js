@@ -79,34 +79,36 @@ async function play() {
   $("play").hidden = false;
   const options = { mode: "vega", renderer: "svg", actions: false };
   const { view } = await vegaEmbed("#charts", page.specification, options);
-  const shown = { trial: linked.get("trial") ?? "", beside: linked.get("beside") ?? "" };
+  const known = (name) => (page.trial.has(linked.get(name)) ? linked.get(name) : "");
+  const shown = { trial: known("trial"), beside: known("beside") };
   const update = async () => {
     await view.runAsync();
     for (const slider of document.querySelectorAll("#controls input"))
       slider.previousElementSibling.value = slider.dataset.texts.split("|")[slider.value];
-    const rows = view.data(page.ranking).toSorted((a, b) => a.rank - b.rank || a.law.localeCompare(b.law));
-    fill($("ranking"), rows.map((row) => [row.place ?? "", row.law, percent(row.rate),
+    const rows = view.data(page.ranking).toSorted((a, b) => a.rank - b.rank || a.contender.localeCompare(b.contender));
+    fill($("ranking"), rows.map((row) => [row.place ?? "", row.contender, percent(row.rate),
       percent(row.difference), `${percent(row.lower)} to ${percent(row.upper)}`, row.apart, row.trials,
-      button("show", () => list(row.law, {}))]));
-    const named = (some) => some.slice(0, 5).map((row) => `${row.law} (${percent(row.rate)} %)`).join(", ")
+      button("show", () => list(row.contender, {}))]));
+    const named = (some) => some.slice(0, 5).map((row) => `${row.contender} (${percent(row.rate)} %)`).join(", ")
       + (some.length > 5 ? ` and ${some.length - 5} more` : "");
     const best = rows.filter((row) => row.place === 1), near = rows.filter((row) => row.place > 1 && row.tied);
     $("leading").textContent = !rows.length ? "No trial is left: choose less." : !rows[0].enough ? page.fewest
-      : !best.length ? "In this view nobody ran every trial and succeeded." : `In this view ${named(best)} succeed${
+      : !best.length ? "In this view nobody ran every trial and succeeded." : `In this view${
+        $("limits").value === "broken" ? ", limits kept or not," : ""} ${named(best)} succeed${
         best.length > 1 ? "" : "s"} most often; ${$("versus").value !== "best" ? `differences are to ${$("versus").value}`
         : near.length ? `not told apart: ${named(near)}` : "all others are told apart"}.`;
-    $("sample").textContent = rows.length ? `${rows[0].laws} formulations, ${Math.max(...rows.map((row) => row.trials))
+    $("sample").textContent = rows.length ? `${rows[0].contenders} formulations, ${Math.max(...rows.map((row) => row.trials))
       } trials each, ${rows[0].count} scenarios` : "";
     const state = asked.filter((name) => $(name).value !== initial[name]).map((name) => [name, $(name).value]);
     state.push(...Object.entries(shown).filter(([, id]) => id));
-    history.replaceState(null, "", `#${new URLSearchParams(state)}`);
+    if (state.length || location.hash.includes("=")) history.replaceState(null, "", `#${new URLSearchParams(state)}`);
   };
   const open = async (trial, beside) => {
     Object.assign(shown, { trial, beside });
     await Promise.all([update(), opened(trial, beside, (other) => open(trial, other))]);
   };
-  const list = async (law, { situation = "", category }) => {
-    await view.signal("picked", law).runAsync();
+  const list = async (contender, { situation = "", category }) => {
+    await view.signal("picked", contender).runAsync();
     const rows = view.data(page.trials).toSorted((a, b) => b.category - a.category || b.farthest - a.farthest)
       .filter((row) => [row.situation, ""].includes(situation) && [row.category, undefined].includes(category));
     const show = (most) => fill($("trials").querySelector("table"), rows.slice(0, most).map((row) => [
@@ -114,11 +116,11 @@ async function play() {
         (each) => digits(each)), button(row.id, () => open(row.id, "")), page.runs[row.id] ? "\u25B6" : ""]));
     show(($("all-trials").checked = false) || 12);
     $("all-trials").onchange = ({ target }) => show(target.checked ? Infinity : 12);
-    $("trials-title").textContent = `${law}${situation && `, ${situation}`}: ${rows.length} trials, the worst first`;
+    $("trials-title").textContent = `${contender}${situation && `, ${situation}`}: ${rows.length} trials, the worst first`;
     $("trials").hidden = false;
     $("trials-title").focus();
   };
-  view.addEventListener("click", (_, item) => item?.datum?.law && list(item.datum.law, item.datum));
+  view.addEventListener("click", (_, item) => item?.datum?.contender && list(item.datum.contender, item.datum));
   for (const name of asked) $(name).addEventListener("input", () => later(0).then(update));
   $("reset").addEventListener("click", () => {
     for (const name of asked) view.signal(name, ($(name).value = initial[name]));
@@ -128,13 +130,14 @@ async function play() {
 }
 
 // Open a trial: its commands, and where its run is carried the replay, beside another one's.
-let replays, stop = () => {};
+let replays, stop = () => {}, openings = 0;
 async function opened(trial, beside, choose) {
+  const opening = ++openings;
   stop();
   replays ??= await inflated(page.replays);
-  const run = replays.runs[trial], law = (id) => page.trial.get(id).law, row = page.trial.get(trial);
+  const run = replays.runs[trial], nameOf = (id) => page.trial.get(id).contender, row = page.trial.get(trial);
   $("run").hidden = false;
-  $("run-title").textContent = `${row.law} on ${row.scenario}, seed ${row.seed}`;
+  $("run-title").textContent = `${row.contender} on ${row.scenario}, seed ${row.seed}`;
   $("run-commands").textContent = `dikbench replay ${trial}\ndikbench run --formulation '${row.formulation}'${
     row.solver === "none" ? "" : ` --solver '${row.solver}'`} --scenario '${row.scenario}' --seed ${row.seed} --plant '${
     row.plant}' --reference ${row.reference === "rest" ? "time" : row.reference}`;
@@ -144,18 +147,19 @@ async function opened(trial, beside, choose) {
   if (!run) return;
   const same = (id) => ["scenario", "seed", "plant", "reference"].every((key) => page.trial.get(id)[key] === row[key]);
   const others = Object.keys(replays.runs).filter((id) => id !== trial && same(id));
-  $("beside").replaceChildren(new Option("nothing", ""), ...others.map((id) => new Option(law(id), id)));
+  $("beside").replaceChildren(new Option("nothing", ""), ...others.map((id) => new Option(nameOf(id), id)));
   $("beside").value = beside;
   $("beside").onchange = () => choose($("beside").value);
   const both = [trial, beside].filter((id) => replays.runs[id]), made = replays.cases[run.case];
   $("run-certificate").textContent = made.certificate.join("\n");
-  const scenes = await Promise.all(both.map((id, k) => staged($("replays").children[k], replays, id, law(id))));
+  const scenes = await Promise.all(both.map((id, k) => staged($("replays").children[k], replays, id, nameOf(id))));
+  if (opening !== openings) return; // another trial has been opened meanwhile
   $("replays").children[1].hidden = both.length < 2;
   const runs = both.map((id) => replays.runs[id]);
   const end = Math.max(...runs.map((each) => each.dt * each.step.at(-1)));
   const traces = structuredClone(page.traces);
   traces.data.find((each) => each.name === "series").values = runs.flatMap((each, k) => each.step.map((step, at) => ({
-    who: law(both[k]), t: step * each.dt, error: each.error[at], speed: each.speed[at], margin: each.margin[at] })));
+    who: nameOf(both[k]), t: step * each.dt, error: each.error[at], speed: each.speed[at], margin: each.margin[at] })));
   const { view } = await vegaEmbed("#traces", traces, { mode: "vega", renderer: "svg", actions: false });
   const show = (t) => {
     $("clock").textContent = `${t.toFixed(2)} s`;
@@ -178,13 +182,13 @@ async function opened(trial, beside, choose) {
     $("go").textContent = "Pause";
     playing = requestAnimationFrame(go);
   };
-  show(run.dt * run.step[run.error.indexOf(Math.max(...run.error))]);
+  show(run.dt * run.step[Math.max(0, run.error.indexOf(Math.max(...run.error)))]);
 }
 
 // Put a run on a stage: returns what moves it to a time.
-async function staged(figure, { runs, cases, robots, client }, id, law) {
+async function staged(figure, { runs, cases, robots, client }, id, name) {
   const run = runs[id], made = cases[run.case], robot = robots[made.robot];
-  figure.firstElementChild.textContent = law;
+  figure.firstElementChild.textContent = name;
   if (!robot) return () => {};
   const frame = openScene(figure.lastElementChild, client, robot.data, matchMedia("(prefers-color-scheme: dark)").matches);
   for (let k = 0; !isSceneReady(frame); k++) if (k < 200) await later(50); else return () => {};
