@@ -50,9 +50,10 @@ def without_workers() -> Iterator[None]:
 
 @contextmanager
 def without_figures() -> Iterator[None]:
-    """Have reports drawn without their figures meanwhile, which take most of their time."""
+    """Have reports made without their figures and what is played: most of their time."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(write, "draw_figures", lambda *given: [])
+        patch.setattr(write, "embed", lambda *given: None)
         yield
 
 

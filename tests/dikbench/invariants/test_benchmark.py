@@ -7,11 +7,13 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 import pytest
+from makers.played import chosen, expected
 from makers.runs import run_here
 
 from dikbench.invariants import INVARIANTS, Invariant, with_straw_laws
 from dikbench.invariants.of_rows import is_straw
 from dikbench.metrics import Outcome
+from dikbench.report.interactive.page_rows import page_rows
 from dikbench.results.reading import read_results, without_attributes
 from dikbench.run.in_workers import RunSettings
 from dikbench.study.study import Cells, Study
@@ -101,3 +103,17 @@ def test_rates_that_depend_on_repetition_are_named(
         success, "hierarchical_weights", lambda cases: np.arange(1.0, len(cases) + 1)
     )
     assert list(INVARIANTS[-1].broken(rows))
+
+
+@pytest.mark.parametrize("reference", ["time", "path"])
+def test_no_straw_law_is_the_best_of_a_page(rows: pd.DataFrame, reference: str) -> None:
+    """Nor of a situation of it: in its ranking the places go by the rate of success alone."""
+    page = page_rows(rows)
+    straw = page["formulation"].isin(rows.loc[is_straw(rows), "formulation"])
+    assert straw.any()
+    view = chosen(page.assign(straw=straw), reference=reference)
+    for part in (view, *(part for _, part in view.groupby("situation"))):
+        rate = {name: value for name, (value, _) in expected(part).items()}
+        of_straw = set(part.loc[part["straw"], "contender"])
+        others = max(value for name, value in rate.items() if name not in of_straw)
+        assert all(rate[name] < others or others == 100 for name in of_straw), rate

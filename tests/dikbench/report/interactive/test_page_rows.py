@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pandas as pd
@@ -9,7 +11,10 @@ import pytest
 from makers.played import chosen, expected
 
 from dikbench.metrics import Judgement
+from dikbench.report.interactive import page_rows as page_rows_module
+from dikbench.report.interactive.page_rows import page_rows, variant
 from dikbench.report.selection.categories import CATEGORIES
+from dikbench.run.again import same_here
 from dikbench.statistics.success import counted, rates, succeeded, with_facts
 
 

@@ -151,3 +151,74 @@ def test_nobody_is_ranked_over_few_scenarios(page: Any) -> None:
     assert set(places) == {""}
     choose(page, robot="panda", situation="at joint limits")
     assert "No trial is left" in page.find_element("id", "leading").text
+
+
+@pytest.mark.parametrize("versus", ["best", "dls[damping=0.05]"])
+def test_intervals_are_those_of_paired_differences(
+    page: Any, rows: pd.DataFrame, versus: str
+) -> None:
+    """D +- 1.96 sqrt(sum w^2 (d - D)^2) over scenarios, by pandas; told apart where 0 is outside."""
+    choose(page, versus=versus, reference="any")
+    found = chosen(rows, versus=versus, reference="any")
+    rate = {name: value for name, (value, _) in expected(found).items()}
+    most = found.groupby("contender").size().max()
+    whole = {str(name) for name, part in found.groupby("contender") if len(part) == most}
+    best = max(sorted(whole), key=lambda name: rate[name]) if versus == "best" else versus
+    levels = ["family", "robot", "scenario"]
+    success = found.groupby(["contender", *levels])["done"].mean()
+    lines = page.execute_script(
+        "return Array.from(document.querySelectorAll('#ranking tbody tr'),"
+        " (row) => Array.from(row.cells, (cell) => cell.textContent))"
+    )
+    assert len(lines) == len(rate)
+    for place, name, _, difference, interval, apart, *_ in lines:
+        own = success[name]
+        weight = own.index.to_frame(index=False)
+        for level, above in zip(levels, [[], levels[:1], levels[:2]], strict=True):
+            distinct = weight[[*above, level]].drop_duplicates()
+            share = distinct.groupby(above).size() if above else len(distinct)
+            weight[f"{level} share"] = 1 / (
+                share if not above else weight.set_index(above).index.map(share).to_numpy()
+            )
+        w = weight[[f"{level} share" for level in levels]].prod(axis=1).to_numpy()
+        d = (own - success[best].reindex(own.index)).to_numpy()
+        mean = float(w @ d)
+        half = 1.96 * float(np.sqrt(((w * (d - mean)) ** 2).sum()))
+        low, high = max(-1.0, mean - half), min(1.0, mean + half)
+        assert float(difference) == pytest.approx(100 * mean, abs=0.0501), name
+        told = [float(each) for each in interval.split(" to ")]
+        assert told == pytest.approx([100 * low, 100 * high], abs=0.0501), name
+        if name in whole:
+            assert apart == ("no" if low <= 0 <= high and rate[name] > 0 else "yes"), name
+        else:
+            assert (place, apart) == ("", ""), name
+
+
+def test_success_over_tolerances_is_that_of_the_rows(page: Any, rows: pd.DataFrame) -> None:
+    """A point for every tolerance and formulation that ran every trial."""
+    choose(page, variant="any")
+    found = chosen(rows, variant="any")
+    most = found.groupby("contender").size().max()
+    wanted = {
+        (str(name), f"{1e3 * tolerance:g}"): expected(
+            part.assign(done=part["outcomes"].str[k].eq("0"))
+        )[str(name)][0]
+        for name, part in found.groupby("contender")
+        for k, tolerance in enumerate(TOLERANCES_M, start=1)
+        if len(part) == most
+    }
+    marks = [m for m in shown_marks(page, "profile") if "tolerance [mm]" in m]
+    said = {(m["formulation"], m["tolerance [mm]"]): m["success"].rstrip("%") for m in marks}
+    assert said.keys() == wanted.keys()
+    for key, success in wanted.items():
+        assert float(said[key]) == pytest.approx(success, abs=0.0501), key
+
+
+def test_pictures_leave_out_who_did_not_run_every_trial(page: Any) -> None:
+    """`sns` ran the easy scenarios only: it would be among the best of what it was asked."""
+    assert shown_ranking(page)["sns"][0] > 90
+    assert "sns" in {mark["formulation"] for mark in shown_marks(page, "matrix")}
+    for view in ("cost", "deadline", "profile"):
+        shown = {mark["formulation"] for mark in shown_marks(page, view)}
+        assert shown, view
+        assert "sns" not in shown, view
