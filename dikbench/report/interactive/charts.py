@@ -55,23 +55,33 @@ def weighted(rows: alt.Chart, *within: str) -> alt.Chart:
 
     It adds `w`, which sums to 1 for each law (and each value of `within`), as
     `statistics.success.hierarchical_weights` does; `rate`, the share of success in it; `trials`,
-    their number; and `whole`, whether no other law has more of them.
+    their number; and `whole`, whether no other law has more of them. Their names end in that of
+    `within`: a field that is computed from itself, or written twice, would change whenever Vega
+    computes a part of the charts anew.
     """
+    end = "".join(f"_in_{each}" for each in within)
     of_each: list[Any] = ["contender", *within]
-    return (
-        rows.transform_joinaggregate(families="distinct(family)", groupby=of_each)
-        .transform_joinaggregate(robots="distinct(robot)", groupby=[*of_each, "family"])
-        .transform_joinaggregate(
-            scenarios="distinct(scenario)", groupby=[*of_each, "family", "robot"]
-        )
-        .transform_joinaggregate(cases="count()", groupby=[*of_each, "family", "robot", "scenario"])
-        .transform_calculate(
-            w="1/(datum.families*datum.robots*datum.scenarios*datum.cases)",
-            done_w="datum.done/(datum.families*datum.robots*datum.scenarios*datum.cases)",
-        )
-        .transform_joinaggregate(rate="sum(done_w)", trials="count()", groupby=of_each)
-        .transform_joinaggregate(most_trials="max(trials)", groupby=list[Any](within))
-        .transform_calculate(whole="datum.trials==datum.most_trials?1:0")
+    product = "*".join(
+        f"datum.{each}{end}" for each in ("families", "robots", "scenarios", "cases")
+    )
+    for number, over, levels in (
+        ("families", "distinct(family)", []),
+        ("robots", "distinct(robot)", ["family"]),
+        ("scenarios", "distinct(scenario)", ["family", "robot"]),
+        ("cases", "count()", ["family", "robot", "scenario"]),
+    ):
+        rows = rows.transform_joinaggregate(groupby=[*of_each, *levels], **{number + end: over})
+    rows = rows.transform_calculate(
+        **{f"w{end}": f"1/({product})", f"done_w{end}": f"datum.done/({product})"}
+    )
+    rows = rows.transform_joinaggregate(
+        groupby=of_each, **{f"rate{end}": f"sum(done_w{end})", f"trials{end}": "count()"}
+    )
+    rows = rows.transform_joinaggregate(
+        groupby=list[Any](within), **{f"most_trials{end}": f"max(trials{end})"}
+    )
+    return rows.transform_calculate(
+        **{f"whole{end}": f"datum.trials{end}==datum.most_trials{end}?1:0"}
     )
 
 
@@ -106,11 +116,17 @@ def ranked(controls: Sequence[Control]) -> alt.Chart:
             sort=[alt.SortField("against", "descending"), alt.SortField("contender")],
             groupby=["scenario"], frame=[None, None],
         )
-        .transform_calculate(w="versus=='best'||datum.rival==versus?datum.w:0")
-        .transform_calculate(d="datum.s-datum.base", wd="datum.w*(datum.s-datum.base)")
-        .transform_joinaggregate(sum_wd="sum(wd)", sum_w="sum(w)", groupby=["contender"])
-        .transform_calculate(w="datum.w/datum.sum_w", difference="datum.sum_wd/datum.sum_w")
-        .transform_calculate(v="pow(datum.w*(datum.d-datum.difference),2)")
+        .transform_calculate(
+            d="datum.s-datum.base", shared="versus=='best'||datum.rival==versus?datum.w:0"
+        )
+        .transform_calculate(shared_d="datum.shared*datum.d")
+        .transform_joinaggregate(
+            all_shared="sum(shared)", all_shared_d="sum(shared_d)", groupby=["contender"]
+        )
+        .transform_calculate(difference="datum.all_shared_d/datum.all_shared")
+        .transform_calculate(
+            v="pow(datum.shared/datum.all_shared*(datum.d-datum.difference),2)"
+        )
         .transform_aggregate(
             rate="max(rate)", trials="max(trials)", whole="max(whole)", count="max(count)",
             difference="max(difference)", variance="sum(v)", rival="max(rival)",
@@ -194,8 +210,8 @@ def _situations(controls: Sequence[Control], situations: Sequence[str], by_succe
     shares = (
         weighted(overall, "situation")
         .transform_aggregate(
-            share="sum(w)", n="count()", trials="max(trials)", rate="max(rate)",
-            sorted="max(sorted)", groupby=["contender", "situation", "category"],
+            share="sum(w_in_situation)", n="count()", trials="max(trials_in_situation)",
+            rate="max(rate_in_situation)", sorted="max(sorted)", groupby=["contender", "situation", "category"],
         )
         .transform_stack(
             stack="share", as_=["a", "b"], groupby=["contender", "situation"],

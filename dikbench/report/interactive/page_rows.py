@@ -12,6 +12,7 @@ import pandas as pd
 
 from dikbench.errors import DikbenchError
 from dikbench.metrics import Judgement, Outcome
+from dikbench.plugins.building import make_formulation
 from dikbench.plugins.drawing import drawn_parameters
 from dikbench.plugins.finding import formulation_plugin, in_file
 from dikbench.plugins.tuned import file_for, key_of, read_tuned
@@ -110,23 +111,19 @@ def variant(formulation: str) -> str:
     if in_file(selector.name):
         return untold
     try:
-        plugin = formulation_plugin(selector.name)
-        tunable = drawn_parameters(plugin, Selector(selector.name))
+        tunable = drawn_parameters(formulation_plugin(selector.name), Selector(selector.name))
         switches = {k: v for k, v in selector.parameters.items() if k not in tunable}
-        tuned = read_tuned(file_for(selector)).get(key_of(Selector(selector.name, switches)))
+        untuned = Selector(selector.name, switches)
+        tuned = read_tuned(file_for(selector)).get(key_of(untuned))
+        # Compared as they are built: 0.05 is 5e-2.
+        own, default = make_formulation(selector), make_formulation(untuned)
+        found = {} if tuned is None else {k: str(v) for k, v in tuned.parameters.items()}
+        best = tuned and make_formulation(Selector(selector.name, {**switches, **found}))
     except DikbenchError:
         return untold
-    given = {k: v for k, v in selector.parameters.items() if k in tunable}
-    at_defaults = all(value == tunable[k].default for k, value in given.items())
-    if not tunable:
+    if not tunable or own == default == best:
         return "both"
-    if tuned is None:
-        return "default" if at_defaults else "other"
-    wanted = {k: tuned.parameters.get(k, tunable[k].default) for k in tunable}
-    is_tuned = {k: given.get(k, tunable[k].default) for k in tunable} == wanted
-    return (
-        ("both" if at_defaults else "tuned") if is_tuned else "default" if at_defaults else "other"
-    )
+    return "tuned" if own == best else "default" if own == default else "other"
 
 
 def _outcomes(rows: pd.DataFrame) -> list[str]:

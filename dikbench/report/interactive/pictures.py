@@ -114,11 +114,11 @@ def profile(controls: Sequence[Control]) -> Any:
         **{place: f"{category_at(str(k))}==0?1:0" for k, place in enumerate(places, start=1)}
     )
     by_scenario = comparable(rows).transform_calculate(
-        **{place: f"datum.w*datum.{place}" for place in places}
+        **{f"{place}_w": f"datum.w*datum.{place}" for place in places}
     )
     found = (
         by_scenario.transform_aggregate(
-            **dict[Any, Any]({place: f"sum({place})" for place in places}),
+            **dict[Any, Any]({place: f"sum({place}_w)" for place in places}),
             rate="max(rate)", n="count()", groupby=["contender"],
         )
         .transform_window(dense="dense_rank()", sort=[alt.SortField("rate", "descending")])
@@ -126,16 +126,23 @@ def profile(controls: Sequence[Control]) -> Any:
         .transform_fold(places, as_=["place", "success"])
         .transform_calculate(millimetres=f"{millimetres}[toNumber(slice(datum.place,2))-1]")
     )  # fmt: skip
-    lines = found.mark_line(strokeWidth=1.5, opacity=0.55, point={"size": 18}).encode(
-        alt.X("millimetres:Q", title="tolerance [mm]", scale=alt.Scale(type="log", nice=False),
-              axis=alt.Axis(values=[1e3 * t for t in TOLERANCES_M], format="~g")),
-        alt.Y("success:Q", title="success", scale=alt.Scale(domain=[0, 1])),
-        detail="contender:N",
-        color=alt.condition("datum.contender==versus", alt.value(CHOSEN), alt.value(OTHER)),
-        tooltip=[NAMED, alt.Tooltip("millimetres:Q", title="tolerance [mm]"),
-                 alt.Tooltip("success:Q", format=".1%"), alt.Tooltip("n:Q", title="trials")],
-    )  # fmt: skip
-    return lines.properties(
+    x = alt.X("millimetres:Q", title="tolerance [mm]", scale=alt.Scale(type="log", nice=False),
+              axis=alt.Axis(values=[1e3 * t for t in TOLERANCES_M], format="~g"))  # fmt: skip
+    y = alt.Y("success:Q", title="success", scale=alt.Scale(domain=[0, 1]))
+    colour = alt.condition("datum.contender==versus", alt.value(CHOSEN), alt.value(OTHER))
+    tooltip = [
+        NAMED,
+        alt.Tooltip("millimetres:Q", title="tolerance [mm]"),
+        alt.Tooltip("success:Q", format=".1%"),
+        alt.Tooltip("n:Q", title="trials"),
+    ]
+    lines = found.mark_line(strokeWidth=1.5, opacity=0.55).encode(
+        x, y, detail="contender:N", color=colour
+    )
+    points = found.mark_circle(size=22, cursor="pointer").encode(
+        x, y, color=colour, tooltip=tooltip
+    )
+    return alt.layer(lines, points).properties(
         width=WIDTH_PX, height=HEIGHT_PX, title="Success against tolerance", name="profile"
     )
 

@@ -11,6 +11,7 @@ import pytest
 from makers.played import chosen, expected
 
 from dikbench.metrics import Judgement
+from dikbench.plugins.building import make_formulation
 from dikbench.report.interactive import page_rows as page_rows_module
 from dikbench.report.interactive.page_rows import page_rows, variant
 from dikbench.report.selection.categories import CATEGORIES
@@ -43,23 +44,28 @@ def test_outcomes_are_those_of_the_judgement(trials: pd.DataFrame, rows: pd.Data
     assert at_2_mm in CATEGORIES[int(rows["outcomes"].iloc[0][2])].outcomes
 
 
+def records_of(rows: pd.DataFrame) -> list[Any]:
+    """Rows as dictionaries."""
+    return rows.to_dict("records")
+
+
 def test_code_in_a_file_is_not_run(tmp_path: Path, trials: pd.DataFrame) -> None:
     """Rows may come from elsewhere: what they name is neither imported nor run again."""
     file = tmp_path / "intruder.py"
     file.write_text(f"open({str(tmp_path / 'ran')!r}, 'w').close()\n")
     named = trials.assign(formulation=f"{file}:Law", formulation_name=f"{file}:Law")
     assert set(page_rows(named)["variant"]) == {"default"}
-    assert same_here(named.to_dict("records")) == []
+    assert same_here(records_of(named)) == []
     elsewhere = trials.assign(scenario=f"{file}:Family", scenario_family=f"{file}:Family")
     page_rows(elsewhere)
-    assert same_here(elsewhere.to_dict("records")) == []
+    assert same_here(records_of(elsewhere)) == []
     assert not (tmp_path / "ran").exists()
 
 
 @pytest.mark.parametrize("status", ["timeout", "crashed", "out-of-memory", "formulation-error"])
 def test_what_did_not_end_by_itself_is_not_run_again(trials: pd.DataFrame, status: str) -> None:
     """It would hold up or end the process of the report; what ended is the same here."""
-    rows: list[Any] = trials[trials["status"].eq("ok")].to_dict("records")
+    rows = records_of(trials[trials["status"].eq("ok")])
     assert len(same_here(rows)) == len(rows) > 0
     assert same_here([{**row, "status": status} for row in rows]) == []
     assert same_here([{**row, "id": "of another source"} for row in rows]) == []
@@ -69,8 +75,10 @@ def test_parameters_are_defaults_tuned_or_others(monkeypatch: pytest.MonkeyPatch
     """By value, not by how they are written; a switch is neither, for it is not tuned."""
     tuned = {"dls": SimpleNamespace(parameters={"damping": 0.02}), "lm": NOTHING_BETTER}
     monkeypatch.setattr(page_rows_module, "read_tuned", lambda file: tuned)
-    assert variant("dls") == variant("dls[damping=0.05]") == "default"
-    assert variant("dls[damping=0.02]") == "tuned"
+    own = make_formulation("dls").damping  # type: ignore[attr-defined]
+    assert variant("dls") == variant(f"dls[damping={own}]") == "default"
+    assert variant(f"dls[damping={own:e}]") == "default"
+    assert variant("dls[damping=0.02]") == variant("dls[damping=2e-2]") == "tuned"
     assert variant("dls[damping=0.3]") == "other"
     assert variant("lm") == "both"
     assert variant("pinv[after=scale]") == "both"
@@ -92,6 +100,6 @@ def test_a_step_takes_its_kinematics_as_well(trials: pd.DataFrame, rows: pd.Data
 
 
 def test_who_refuses_the_difficult_is_not_ranked_by_the_rest(rows: pd.DataFrame) -> None:
-    """`sns` was asked in three scenarios only: it has fewer trials than the others."""
+    """`pinv[after=clip]` was asked in one scenario only: it has fewer trials than the others."""
     counts = chosen(rows).groupby("contender").size()
-    assert counts["sns"] < counts.max()
+    assert counts["pinv[after=clip]"] < counts.max()
