@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import altair as alt
@@ -70,19 +70,20 @@ def weighted(rows: alt.Chart, *within: str) -> alt.Chart:
         ("scenarios", "distinct(scenario)", ["family", "robot"]),
         ("cases", "count()", ["family", "robot", "scenario"]),
     ):
-        rows = rows.transform_joinaggregate(groupby=[*of_each, *levels], **{number + end: over})
+        rows = _joined(rows, [*of_each, *levels], {f"{number}{end}": over})
     rows = rows.transform_calculate(
         **{f"w{end}": f"1/({product})", f"done_w{end}": f"datum.done/({product})"}
     )
-    rows = rows.transform_joinaggregate(
-        groupby=of_each, **{f"rate{end}": f"sum(done_w{end})", f"trials{end}": "count()"}
-    )
-    rows = rows.transform_joinaggregate(
-        groupby=list[Any](within), **{f"most_trials{end}": f"max(trials{end})"}
-    )
+    rows = _joined(rows, of_each, {f"rate{end}": f"sum(done_w{end})", f"trials{end}": "count()"})
+    rows = _joined(rows, list(within), {f"most_trials{end}": f"max(trials{end})"})
     return rows.transform_calculate(
         **{f"whole{end}": f"datum.trials{end}==datum.most_trials{end}?1:0"}
     )
+
+
+def _joined(rows: alt.Chart, each: list[Any], aggregates: Mapping[str, Any]) -> alt.Chart:
+    """Add aggregates of the rows that agree in some fields to each of them."""
+    return rows.transform_joinaggregate(groupby=each, **aggregates)
 
 
 def comparable(rows: alt.Chart) -> alt.Chart:
@@ -211,7 +212,8 @@ def _situations(controls: Sequence[Control], situations: Sequence[str], by_succe
         weighted(overall, "situation")
         .transform_aggregate(
             share="sum(w_in_situation)", n="count()", trials="max(trials_in_situation)",
-            rate="max(rate_in_situation)", sorted="max(sorted)", groupby=["contender", "situation", "category"],
+            rate="max(rate_in_situation)", sorted="max(sorted)",
+            groupby=["contender", "situation", "category"],
         )
         .transform_stack(
             stack="share", as_=["a", "b"], groupby=["contender", "situation"],
