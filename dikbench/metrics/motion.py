@@ -102,7 +102,7 @@ class Motion:
     @_by_rows
     def _alpha(self) -> Array:
         """The same in every step, (n,); NaN in dwells."""
-        weights = row_weights(self.scenario.rows)
+        weights = row_weights(self.scenario.rows, self.scenario.characteristic_length)
         return progress(self.trace.wanted, self.achieved, weights)
 
     @_by_rows
@@ -111,7 +111,7 @@ class Motion:
 
         NaN in a dwell and where the robot stands still (see `off_course`).
         """
-        weights = row_weights(self.scenario.rows)
+        weights = row_weights(self.scenario.rows, self.scenario.characteristic_length)
         return off_course(self.trace.wanted, self.achieved, weights)
 
     @_by_rows

@@ -14,6 +14,7 @@ from dikbench.errors import DikbenchError
 from dikbench.parameters import Parameters, Range, parameters_of
 from dikbench.problem.constraints import Constraint
 from dikbench.problem.embedding import embedding_of
+from dikbench.problem.progress import CHARACTERISTIC_LENGTH_M
 from dikbench.problem.tasks import PoseTask, Task, TrackingTask, TrackingTogether
 from dikbench.robots.catalogue import ROBOTS
 from dikbench.robots.loading import load_robot
@@ -113,6 +114,7 @@ class Family(Parameters, ABC):
         dt: control period.
         acceleration: whether acceleration limits are in force, or which [rad/s^2 or m/s^2], one for
             all joints or one for each, separated by spaces.
+        characteristic_length: at which a turn counts as a way (see `Scenario`).
         robots: robots on which the defaults are certified, where the family takes any robot.
         variation: the ranges of what a seed perturbs.
         grid: the two parameters of a phase diagram, horizontal and vertical.
@@ -131,6 +133,7 @@ class Family(Parameters, ABC):
     gain: Gain = 5.0
     dt: Time = 0.01
     acceleration: bool | float | str = False
+    characteristic_length: Annotated[float, Range(above=0.0, unit="m")] = CHARACTERISTIC_LENGTH_M
 
     robots: ClassVar[tuple[str, ...]] = ()
     variation: ClassVar[Variation] = NO_VARIATION
@@ -190,7 +193,7 @@ class Family(Parameters, ABC):
             tasks = secondary_tasks(robot, case.q0, tracking)
         if v0 is None:
             v0 = start_velocity(robot, case.reference, case.q0, first_level(tracking, tasks))
-        witness = _first_witness(case, robot, tracking, v0)
+        witness = _first_witness(case, robot, tracking, v0, self.characteristic_length)
         feasible, duration = _feasible(case.reference, witness), case.reference.duration
         until, comes_back = case.followable_until, case.comes_back
         if witness is None and case.motion is not None:
@@ -224,6 +227,7 @@ class Family(Parameters, ABC):
             followable_until=until,
             comes_back=comes_back,
             situation=situation,
+            characteristic_length=self.characteristic_length,
         )
         made.certificate.check(type(self).__name__)
         if self.outruns_sampling:
@@ -279,10 +283,12 @@ class Family(Parameters, ABC):
         return oracle_motion(robot, reference, q0, instants, tracking)
 
 
-def _first_witness(case: Case, robot: Robot, tracking: TrackingTask, v0: Array) -> Witness | None:
+def _first_witness(
+    case: Case, robot: Robot, tracking: TrackingTask, v0: Array, length: float
+) -> Witness | None:
     """Return the first of a case's joint motions that is a witness; None where none is."""
     reference = case.reference
-    embedding = embedding_of(tracking, robot, reference.placement(0.0).rotation)
+    embedding = embedding_of(tracking, robot, reference.placement(0.0).rotation, length)
     for motion in (case.motion, case.witness):
         if motion is not None and does_the_task(robot, motion, reference, embedding):
             witness = witness_of(robot, motion, case.constraints, v0, reference.duration)

@@ -43,15 +43,22 @@ class HeldFrame:
 
 
 def held_frames(
-    robot: Robot, tracking: TrackingTask, tasks: tuple[Task, ...]
+    robot: Robot, tracking: TrackingTask, tasks: tuple[Task, ...], length: float
 ) -> tuple[HeldFrame, ...]:
-    """Find the frames that are held by other tasks of the priority of the tracking."""
+    """Find the frames that are held by other tasks of the priority of the tracking.
+
+    Args:
+        robot: the robot.
+        tracking: the task that follows the reference.
+        tasks: the other tasks.
+        length: L [m], the lever that turns angles into lengths.
+    """
     held = []
     for task in tasks:
         if task.priority != tracking.priority or not isinstance(task, FRAME_TASKS):
             continue
         rotation, translation = _parts(task.target)
-        embedding = embedding_of(task, robot, rotation)
+        embedding = embedding_of(task, robot, rotation, length)
         index = robot.frame_id if task.frame is None else frame_id(robot.model, task.frame)
         held.append(HeldFrame(index, embedding, rotation, translation))
     return tuple(held)

@@ -17,7 +17,6 @@ import pinocchio as pin
 from dikbench.arrays import Array
 from dikbench.problem.constraints import CollisionConstraint
 from dikbench.problem.embedding import embedding_of
-from dikbench.problem.progress import CHARACTERISTIC_LENGTH_M
 from dikbench.problem.tasks import PoseTask, PositionTask
 from dikbench.robots.collision.bodies import collision_bodies
 from dikbench.robots.kinematics import Kinematics
@@ -68,7 +67,8 @@ def _times(scenario: Scenario) -> Array:
 
 
 def _asks_for_the_whole_pose(scenario: Scenario) -> bool:
-    pose = embedding_of(PoseTask(), scenario.robot, scenario.reference.placement(0.0).rotation)
+    start, length = scenario.reference.placement(0.0).rotation, scenario.characteristic_length
+    pose = embedding_of(PoseTask(), scenario.robot, start, length)
     asked = scenario.embedding
     parts = ((pose.linear, asked.linear), (pose.left, asked.left), (pose.right, asked.right))
     if asked.by_error:
@@ -91,9 +91,10 @@ def _beyond_the_reach(scenario: Scenario, times: Array) -> str:
         tried = [float(scenario.motion.instants[deepest])] if margin[deepest] < 0 else []
     for tau in tried:
         target = reference.placement(tau)
-        if is_out_of_reach(robot, target, scenario.tolerance_m, whole_pose=whole_pose):
+        tolerance, length = scenario.tolerance_m, scenario.characteristic_length
+        if is_out_of_reach(robot, target, tolerance, whole_pose=whole_pose, length=length):
             return (
-                f"no posture inside the position limits comes within {scenario.tolerance_m:g} m of "
+                f"no posture inside the position limits comes within {tolerance:g} m of "
                 f"the target at {tau:.3g} s, by bounds along the chain"
             )
     return ""
@@ -120,7 +121,7 @@ def _rigid_clearance(scenario: Scenario, last: float) -> str:
     distance, margin, tau = deepest
     if distance >= margin - ALLOWED_INSIDE_M:
         return ""
-    lever = _size_of_what_is_carried(scenario) / CHARACTERISTIC_LENGTH_M
+    lever = _size_of_what_is_carried(scenario) / scenario.characteristic_length
     mended = scenario.tolerance_m * float(np.hypot(1.0, lever))
     if distance + mended < margin - ALLOWED_INSIDE_M:
         return (

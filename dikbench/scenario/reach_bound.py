@@ -72,7 +72,14 @@ class _Where:
     point: Array | None
 
 
-def is_out_of_reach(robot: Robot, target: Any, tolerance: float, *, whole_pose: bool) -> bool:
+def is_out_of_reach(
+    robot: Robot,
+    target: Any,
+    tolerance: float,
+    *,
+    whole_pose: bool,
+    length: float = CHARACTERISTIC_LENGTH_M,
+) -> bool:
     """Say whether it is proven that no posture inside the position limits is at a placement.
 
     Args:
@@ -80,6 +87,7 @@ def is_out_of_reach(robot: Robot, target: Any, tolerance: float, *, whole_pose: 
         target: the placement of the task frame (`pinocchio.SE3`).
         tolerance: distance from it up to which a posture is there [m] (see `Embedding`).
         whole_pose: whether the orientation counts as well as the position.
+        length: L of that distance [m].
     """
     chain = _chain(robot)
     if not chain:
@@ -100,7 +108,7 @@ def is_out_of_reach(robot: Robot, target: Any, tolerance: float, *, whole_pose: 
     if not whole_pose:
         return False
     in_last = flange.act(target.actInv(world_base))
-    return _no_cell_is_left(chain, where, flange, in_last, away, tolerance)
+    return _no_cell_is_left(chain, where, flange, in_last, away, tolerance, length)
 
 
 def _chain(robot: Robot) -> list[_Joint]:
@@ -194,6 +202,7 @@ def _no_cell_is_left(
     in_last: Array,
     away: float,
     tolerance: float,
+    length: float,
 ) -> bool:
     """Divide the angles of the last joints into cells until all are excluded, or too many are not.
 
@@ -204,15 +213,16 @@ def _no_cell_is_left(
         in_last: the base point in that frame where the task frame is at its target, (3,) [m].
         away: distance of the base point from the task frame [m].
         tolerance: distance from the target up to which a posture is there [m].
+        length: L of that distance [m].
     """
     last = chain[::-1][: min(LAST_JOINTS, len(chain) - 1)]
     bounds = where[::-1]
     # A turn of the task frame by an angle moves the base point by as much times its distance, as
     # seen from there, and a joint's origin by as much times its own.
-    turned = tolerance * float(np.hypot(1.0, away / CHARACTERISTIC_LENGTH_M))
+    turned = tolerance * float(np.hypot(1.0, away / length))
     lengths = [flange, *(joint.placement for joint in last)]
     levers = np.cumsum([float(np.linalg.norm(X.translation)) for X in lengths])
-    moved = tolerance * np.hypot(1.0, levers / CHARACTERISTIC_LENGTH_M)
+    moved = tolerance * np.hypot(1.0, levers / length)
     half = np.array([[(joint.upper - joint.lower) / 2 for joint in last]])
     centre = np.array([[(joint.upper + joint.lower) / 2 for joint in last]])
     while len(centre) and len(centre) <= CELLS_MOST:

@@ -12,6 +12,7 @@ import pinocchio as pin
 from dikbench.arrays import Array
 from dikbench.problem.constraints import CollisionConstraint, Constraint, TorqueConstraint
 from dikbench.problem.embedding import Embedding, Placements, embedding_of
+from dikbench.problem.progress import CHARACTERISTIC_LENGTH_M
 from dikbench.problem.tasks import Task, TrackingTask, TrackingTogether
 from dikbench.problem.tasks.task import check_rotation
 from dikbench.robots.collision.obstacles import Obstacle
@@ -73,6 +74,7 @@ class Scenario:
             followed to its end.
         comes_back: whether the end of the reference can be reached.
         situation: what is difficult about it.
+        characteristic_length: L [m]; a turn by a small angle counts as L times as much of a way.
     """
 
     robot: Robot
@@ -96,6 +98,7 @@ class Scenario:
     followable_until: float | None = None
     comes_back: bool = True
     situation: Situation = "free space"
+    characteristic_length: float = CHARACTERISTIC_LENGTH_M
 
     def __post_init__(self) -> None:
         """Check the number of control steps (see `steps_in`), the start and the reference.
@@ -189,7 +192,7 @@ class Scenario:
     def embedding(self) -> Embedding:
         """Maps placements of the task frame to points, by what is tracked of them."""
         start = self.reference.placement(0.0).rotation
-        return embedding_of(self.tracking, self.robot, start)
+        return embedding_of(self.tracking, self.robot, start, self.characteristic_length)
 
     @cached_property
     def embedded_path(self) -> EmbeddedPath | None:
@@ -235,7 +238,7 @@ class Scenario:
     @cached_property
     def held_frames(self) -> tuple[HeldFrame, ...]:
         """The other frames whose tasks are of the priority of the tracking."""
-        return held_frames(self.robot, self.tracking, self.tasks)
+        return held_frames(self.robot, self.tracking, self.tasks, self.characteristic_length)
 
     def along(self, motion: OracleMotion, tau: float) -> Array:
         """Compute the configuration of a joint motion at a nominal time [s], (nq,).

@@ -180,7 +180,8 @@ def recorded(
     """
     n = len(applied)
     achieved = np.einsum("kij,kj->ki", jacobians, commanded)
-    alpha = progress(desired, achieved, row_weights(scenario.rows))
+    weights = row_weights(scenario.rows, scenario.characteristic_length)
+    alpha = progress(desired, achieved, weights)
     ok = STEP_CODE[Status.OK]
     status = status.copy()
     status[(status == ok) & rechecked.lied[:n]] = STEP_CODE[Status.NOT_VERIFIED]

@@ -24,9 +24,10 @@ ROWS = ("xyrz", "world:xyrz", "xyzrx", "world:xyzry", "xry", "zrxry", "rz")
 
 
 @lru_cache
-def scenario(rows: str) -> Scenario:
+def scenario(rows: str, length: float = CHARACTERISTIC_LENGTH_M) -> Scenario:
     """A target that turns and tilts there and back."""
-    return make_scenario(f"back-and-forth[robot=ur5,rows={rows}]")
+    asked = f"robot=ur5,rows={rows},characteristic_length={length}"
+    return make_scenario(f"back-and-forth[{asked}]")
 
 
 def placed(rows: tuple[int, ...], world: bool, X_d: pin.SE3, e: Array, free: Array) -> pin.SE3:
@@ -78,14 +79,20 @@ def test_what_is_judged_is_what_is_asked_for(rows: str, seed: int, wrong: float)
 
 
 @pytest.mark.parametrize(
-    ("rows", "mode"), [("xyrz", "time"), ("world:xyrz", "path"), ("zrx", "time"), ("zrx", "path")]
+    ("rows", "mode", "length"),
+    [
+        ("xyrz", "time", 0.2),
+        ("world:xyrz", "path", 0.5),
+        ("zrx", "time", 0.1),
+        ("zrx", "path", 0.2),
+    ],
 )
-def test_a_run_is_judged_by_its_own_error(rows: str, mode: ReferenceMode) -> None:
-    """The distance from the target is the length of the task's error, angles times 0.2 m."""
-    case, law = scenario(rows), make_formulation("pinv")
+def test_a_run_is_judged_by_its_own_error(rows: str, mode: ReferenceMode, length: float) -> None:
+    """The distance from the target is the length of the task's error, angles times L."""
+    case, law = scenario(rows, length), make_formulation("pinv")
     run = simulate(case, law, solve_for(law), make_plant("ideal"), mode)
     motion, kinematics = motion_of(run.trace, case, run.jacobians), Kinematics(case.robot)
-    lever = np.where(np.array(case.rows) < 3, 1.0, CHARACTERISTIC_LENGTH_M)
+    lever = np.where(np.array(case.rows) < 3, 1.0, length)
     errors = []
     for q, tau in zip(run.trace.q, run.trace.tau.tolist(), strict=True):
         kinematics.update(q)
