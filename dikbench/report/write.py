@@ -15,6 +15,7 @@ from dikbench.report.tables.console import to_text
 from dikbench.report.tables.files import write_table
 from dikbench.report.tables.instances import write_instances
 from dikbench.report.tables.kinds import TIMING
+from dikbench.report.tables.leads import write_leads
 from dikbench.report.tables.markdown import markdown_rows
 from dikbench.report.tables.peers import write_peers_tables
 from dikbench.report.tables.return_codes import TITLE as RETURN_CODES
@@ -40,6 +41,7 @@ def write_report(path: Path) -> str:
         contents = gather(results, draw_figures(results.folder, results.trials, results.manifest))
         codes = _write_tables(path, contents)
         write_instances(read_attempts(path), path / "tables")
+        write_leads(results.trials, path / "tables")
         write_peers_tables(read_peers(path), path / "tables")
         page = render_html(contents, path / "figures", embed(results.trials))
         (path / "report.html").write_text(page, encoding="utf-8")

@@ -14,7 +14,7 @@ and seeds of a scenario are too much alike to make up for it. Nothing else is co
 of formulations that may not be first change nothing.
 
 That one is first does not say that the others are worse: `places` tells in addition whom the rows
-do not exclude, however far its rate is behind.
+do not exclude, however far its rate is behind, and who leads where a robot or a family is left out.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ import pandas as pd
 from dikbench.arrays import Array, Mask
 from dikbench.metrics import Outcome
 from dikbench.scenario.oracle import ORACLES
+from dikbench.statistics.leaving_out import without_each
 from dikbench.statistics.success import Contender, Rates, paired_means, rates, succeeded
 from dikbench.statistics.trial_matrix import CONTENDER
 
@@ -149,15 +150,21 @@ def places(part: pd.DataFrame, found: Rates, rivals: Mask) -> tuple[Mask, Mask]:
 
     Returns:
         Who is first (see `first_places`), and, these included, of whom nobody is beyond doubt more
-        successful (the interval of its difference to the best holds 0) or as good and faster; (k,)
-        each, nobody where there are too few scenarios.
+        successful (the interval of its difference to the best holds 0) or as good and faster, or
+        who alone leads where a robot or a family is left out and enough scenarios stay; (k,) each,
+        nobody where there are too few scenarios.
     """
     if too_few(part):
         nobody = np.zeros(len(found.best), dtype=bool)
         return nobody, nobody
     not_slower = ~_slower(part, found)
     not_worse = rivals & (found.upper >= 0)
-    return found.best & not_slower, (found.best | not_worse) & not_slower
+    may_lead = (found.best | not_worse) & not_slower
+    for without in without_each(part, found):
+        leaders = without.leaders(rivals)
+        if without.scenarios >= FEWEST_SCENARIOS and not (leaders & may_lead).any():
+            may_lead = may_lead | leaders
+    return found.best & not_slower, may_lead
 
 
 def _asks_for_motion(trials: pd.DataFrame) -> pd.Series:

@@ -130,7 +130,7 @@ def rates(
     """
     layout = TrialMatrix.of(trials)
     matrix = layout.fill(done.astype(float))
-    cases = _cases(trials, layout)
+    cases = case_facts(trials, layout)
     base = hierarchical_weights(cases)
     rate, ran_there = weighted_means(matrix, base), ~np.isnan(matrix)
     whole: Mask = np.asarray(ran_there.all(axis=0))
@@ -188,8 +188,8 @@ def hierarchical_weights(cases: pd.DataFrame) -> Array:
     return weights
 
 
-def _cases(trials: pd.DataFrame, layout: TrialMatrix) -> pd.DataFrame:
-    """Return the facts of each row of the matrix."""
+def case_facts(trials: pd.DataFrame, layout: TrialMatrix) -> pd.DataFrame:
+    """Return the family, robot and scenario of each row of the matrix."""
     first = trials.assign(row=layout.row).drop_duplicates("row").sort_values("row")
     found: pd.DataFrame = first[list(LEVELS)].fillna("").reset_index(drop=True)
     return found

@@ -10,7 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dikbench.statistics.first_places import dependable, first_places
+from dikbench.report.sentences.findings import leaders
+from dikbench.report.sentences.words import Names
+from dikbench.statistics.first_places import dependable, first_places, places
+from dikbench.statistics.leaving_out import without_each
 from dikbench.statistics.success import counted, hierarchical_weights, rates, succeeded, with_facts
 
 
@@ -223,3 +226,57 @@ def test_half_of_the_best_in_a_small_sample_is_not_told_apart_and_not_first() ->
     assert found.rate.tolist() == pytest.approx([1.0, 0.5])
     assert found.upper[1] >= 0
     assert first_places(rows, found).tolist() == [True, False]
+
+
+@settings(max_examples=40, deadline=None)
+@given(studies())
+def test_rates_without_one_are_those_of_the_rows_that_are_left(rows: pd.DataFrame) -> None:
+    """Leaving a robot or a family out is the same as not having run it."""
+    found = rates(rows, succeeded(rows))
+    left_out = list(without_each(rows, found))
+    names = found.contenders["formulation"].tolist()
+    for each in left_out:
+        rest = rows[rows["robot" if each.kind == "robot" else "scenario_family"].ne(each.name)]
+        by_hand = [_mean_of_means(rest[rest["formulation"].eq(name)]) for name in names]
+        assert each.rate.tolist() == pytest.approx(by_hand)
+        assert each.scenarios == rest["scenario"].nunique()
+    told = {(each.kind, each.name) for each in left_out}
+    for kind, column in (("robot", "robot"), ("family", "scenario_family")):
+        values = set(rows[column])
+        assert {name for what, name in told if what == kind} == (
+            values if len(values) > 1 else set()
+        )
+
+
+def test_who_leads_without_one_robot_is_not_excluded_from_being_first() -> None:
+    """All that one law is ahead by is what it does on a single robot."""
+    names = [f"f.{robot}.{robot}{number}" for robot in "rst" for number in range(6)]
+    ahead = {name: name[2] == "r" or name.endswith("0") for name in names}
+    behind = {name: name[2] != "r" and name[-1] in "012" for name in names}
+    rows = pd.DataFrame(
+        [
+            trial(
+                name,
+                law,
+                "success" if done[name] else "late",
+                slow_down=1.0,
+                sees_constraints=np.nan,
+            )
+            for law, done in (("a", ahead), ("b", behind))
+            for name in names
+        ]
+    )
+    found = rates(rows, succeeded(rows))
+    leads = {
+        each.name: found.contenders["formulation"][each.leaders(found.whole)].tolist()
+        for each in without_each(rows, found)
+    }
+    assert leads == {"r": ["b"], "s": ["a"], "t": ["a"]}
+    rivals = np.ones(2, dtype=bool)
+    first, may_lead = places(rows, found, rivals)
+    assert first.tolist() == [True, False]
+    assert may_lead.tolist() == [True, True]
+    leading = leaders(rows, "path", [("a", "none"), ("b", "none")], Names(rows))
+    assert leading is not None
+    assert not leading.alone
+    assert "highest is `b` without the robot r" in leading.finding.text
