@@ -13,12 +13,12 @@ import pandas as pd
 from dikbench.arrays import Array, Mask
 from dikbench.metrics import Outcome
 from dikbench.report.selection.judged import IN_WORDS
+from dikbench.report.sentences.robustness import without_one
 from dikbench.report.sentences.sample import cases_in_words
 from dikbench.report.sentences.words import FEW, Names, listed, number, several
 from dikbench.statistics.accuracy import SMALLEST_DISTANCE_M, log_distances
 from dikbench.statistics.failures import ran
 from dikbench.statistics.first_places import FEWEST_SCENARIOS, places, told_of, too_few
-from dikbench.statistics.leaving_out import without_each
 from dikbench.statistics.stability import LARGEST_DRIFT_SHARE as DRIFT
 from dikbench.statistics.stability import STABLE
 from dikbench.statistics.success import (
@@ -34,9 +34,6 @@ from dikbench.statistics.trial_matrix import CONTENDER
 
 NEARER: Final = 1.05
 """Who is nearer to the path is so by more than this ratio."""
-
-LEADS: Final = 3
-"""So many robots and families are told that change who has the highest rate; others are counted."""
 
 SAME_SHARE: Final = 0.01
 """Shares that differ by less than this part of the larger one are the same."""
@@ -125,7 +122,7 @@ def leaders(
     if question != "Nobody stands out":
         said += _as_good(part, found, barred or {}, float(found.rate[first].max()), names)
     if question in {"First", "May be first"}:
-        said += _without_one(part, found, rivals, every, names)
+        said += without_one(part, found, rivals, every, names)
     text = f"success of {cases_in_words(part)}: {said}{_pace(part, setting, may_lead, found)}."
     contenders = tuple(every[k] for k in order)
     return Leaders(contenders, alone, found, Finding(f"{question} where {IN_WORDS[setting]}", text))
@@ -182,20 +179,6 @@ def _next(found: Rates, others: Mask, every: Sequence[Contender], names: Names) 
     points = low if low == high else f"{low} to {high}"
     named = names.of([every[k] for k in who])
     return f"; next of the candidates is {named} with {number(100 * most)} %, {points} points less"
-
-
-def _without_one(
-    part: pd.DataFrame, found: Rates, rivals: Mask, every: Sequence[Contender], names: Names
-) -> str:
-    """Say who has the highest rate instead where a robot or a family is left out."""
-    most = found.rate[rivals].max() - ROUNDING
-    told = []
-    for without in without_each(part, found):
-        leaders = without.leaders(rivals)
-        if without.scenarios >= FEWEST_SCENARIOS and not (found.rate[leaders] >= most).any():
-            led = names.of(each for each, leads in zip(every, leaders, strict=True) if leads)
-            told.append(f"{led} without the {without.kind} {without.name}")
-    return f"; highest is {listed(told, LEADS)}" if told else ""
 
 
 def _pace(part: pd.DataFrame, setting: Setting, who: Mask, found: Rates) -> str:

@@ -23,6 +23,7 @@ from dikbench.report.sentences.findings import (
     unanswered,
 )
 from dikbench.report.sentences.headline import headline
+from dikbench.report.sentences.robustness import hangs_on_conventions
 from dikbench.report.sentences.words import Names, several
 from dikbench.scenario.oracle import ORACLES
 from dikbench.scenario.situation import Situation
@@ -117,11 +118,13 @@ def summarise(trials: pd.DataFrame) -> Summary:
         if findings:
             chapters.append(Chapter(situation, definition, tuple(scenarios), tuple(findings)))
     among = set().union(*candidates.values())
+    conventions = hangs_on_conventions(of_setting)
     short = (
         *first_most_often(firsts, names),
         fastest(contenders, among, names),
         broke_off(contenders, names),
         unanswered(every[~every["formulation"].isin(ORACLES)], names),
+        Finding("The order and conventions", conventions) if conventions else None,
     )
     said = tuple(each for each in short if each)
     return Summary(

@@ -1,4 +1,4 @@
-"""Who has the highest rate of success in each situation, and without each robot or family."""
+"""What the highest rates of success hang on: a robot, a family, a parameter of all scenarios."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ import numpy as np
 import pandas as pd
 
 from dikbench.report.selection.judged import DEFINITIONS, SETTINGS, judged_rows, rows_of_all
+from dikbench.scenario.oracle import ORACLES
 from dikbench.statistics.first_places import dependable, told_of, too_few
 from dikbench.statistics.leaving_out import WithoutOne, without_each
+from dikbench.statistics.rank_agreement import rank_agreement
 from dikbench.statistics.success import rates, succeeded
 
 
@@ -61,9 +63,21 @@ def leads_table(trials: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(lines)
 
 
+def rank_agreement_table(trials: pd.DataFrame) -> pd.DataFrame:
+    """Make a row per setting, parameter and value (see `rank_agreement`), oracles left out.
+
+    Args:
+        trials: the rows of trials.csv.
+    """
+    contenders = trials[~trials["formulation"].isin(ORACLES)]
+    found = {setting: rank_agreement(judged_rows(contenders, setting)) for setting in SETTINGS}
+    return pd.concat(found, names=["setting", ""]).reset_index("setting")
+
+
 def write_leads(trials: pd.DataFrame, folder: Path) -> None:
-    """Write leads.csv, if there are rows."""
-    table = leads_table(trials)
-    if len(table):
-        folder.mkdir(exist_ok=True)
-        table.to_csv(folder / "leads.csv", index=False, float_format="%.4g")
+    """Write leads.csv and rank_agreement.csv, if there are rows."""
+    tables = {"leads": leads_table(trials), "rank_agreement": rank_agreement_table(trials)}
+    for name, table in tables.items():
+        if len(table):
+            folder.mkdir(exist_ok=True)
+            table.to_csv(folder / f"{name}.csv", index=False, float_format="%.4g")
