@@ -49,11 +49,18 @@ def without_workers() -> Iterator[None]:
 
 
 @contextmanager
+def not_played() -> Iterator[None]:
+    """Have reports made without what is played: half of their time."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(write, "embed", lambda *given: None)
+        yield
+
+
+@contextmanager
 def without_figures() -> Iterator[None]:
     """Have reports made without their figures and what is played: most of their time."""
-    with pytest.MonkeyPatch.context() as patch:
+    with not_played(), pytest.MonkeyPatch.context() as patch:
         patch.setattr(write, "draw_figures", lambda *given: [])
-        patch.setattr(write, "embed", lambda *given: None)
         yield
 
 
