@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 
 from dikbench.arrays import Array
+from dikbench.programs.answer import Answer
 from dikbench.programs.quadratic_program import ProgramKind, QuadraticProgram
 from dikbench.solvers.catalogue.back_ends import BACK_ENDS, is_installed, parse_solver
 from dikbench.solvers.checked_solve import CheckedSolve, make_solve
+from dikbench.solvers.recheck.residuals import Residuals, residuals
+from dikbench.solvers.recheck.stack import Stack
 
 LIBRARIES_WARN: Final = [
     pytest.mark.filterwarnings(r"ignore::UserWarning:qpsolvers\."),
@@ -68,3 +71,11 @@ def no_point() -> QuadraticProgram:
     return QuadraticProgram(
         np.eye(2), np.zeros(2), A=A, b=np.array([3.0]), lb=-np.ones(2), ub=np.ones(2)
     )
+
+
+def residuals_of(program: QuadraticProgram, answer: Answer) -> Residuals:
+    """The residuals of one answer, (1,) each."""
+    found = residuals(Stack([program], [answer]))
+    for part in ("primal", "dual", "gap", "nearness"):
+        assert getattr(found, part).shape == (1,), part
+    return found
