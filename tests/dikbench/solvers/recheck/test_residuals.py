@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from makers.programs import LIBRARIES_WARN, mixture, residuals_of
+from makers.programs import LIBRARIES_WARN, mixture, one_bound, residuals_of
 
 from dikbench.programs.answer import Answer
 from dikbench.programs.quadratic_program import QuadraticProgram
@@ -51,11 +51,6 @@ def test_the_primal_residual_is_the_worst_violation(x: list[float], primal: floa
     assert residuals_of(program, answer).primal == pytest.approx(primal)
 
 
-def _one_bound() -> QuadraticProgram:
-    """Min 1/2 x^2 - 2 x on [0, 1]: x = 1 with the multiplier 1 of the upper bound."""
-    return QuadraticProgram(np.eye(1), np.array([-2.0]), lb=np.zeros(1), ub=np.ones(1))
-
-
 @pytest.mark.parametrize(
     ("x", "multiplier", "dual", "gap"),
     [
@@ -69,7 +64,7 @@ def test_dual_residual_and_gap_of_a_bound(
     x: float, multiplier: float, dual: float, gap: float
 ) -> None:
     """By hand: |x - 2 + z| and |x (x - 2) + ub z+ + lb z-|."""
-    found = residuals_of(_one_bound(), Answer(np.array([x]), True, z_box=np.array([multiplier])))
+    found = residuals_of(one_bound(), Answer(np.array([x]), True, z_box=np.array([multiplier])))
     assert found.dual == pytest.approx(dual)
     assert found.gap == pytest.approx(gap)
     assert found.within(TOLERANCE) == (dual == gap == 0.0)
@@ -121,12 +116,12 @@ def test_dual_residuals_are_relative_to_the_cost() -> None:
 
 def test_unknown_multipliers_leave_the_dual_unknown() -> None:
     """NaN, and the verdict rests on the primal residual alone."""
-    found = residuals_of(_one_bound(), Answer(np.array([1.0]), True))
+    found = residuals_of(one_bound(), Answer(np.array([1.0]), True))
     assert found.primal == 0.0
     assert math.isnan(found.dual[0])
     assert math.isnan(found.gap[0])
     assert found.within(TOLERANCE)
-    assert not residuals_of(_one_bound(), Answer(np.array([1.1]), True)).within(TOLERANCE)
+    assert not residuals_of(one_bound(), Answer(np.array([1.1]), True)).within(TOLERANCE)
 
 
 @pytest.mark.parametrize("excess", [0.5, 2.0])
@@ -134,7 +129,7 @@ def test_the_tolerance_of_verification(excess: float) -> None:
     """At most the tolerance of violation is accepted, whichever it is."""
     for tolerance in TOLERANCES.values():
         x = np.array([1.0 + excess * tolerance])
-        assert residuals_of(_one_bound(), Answer(x, True)).within(tolerance) == (excess < 1)
+        assert residuals_of(one_bound(), Answer(x, True)).within(tolerance) == (excess < 1)
 
 
 # --- many at once
@@ -192,7 +187,7 @@ def test_one_soft_cost_among_stiff_ones_is_not_hidden_by_them() -> None:
 
 def test_nothing_follows_from_residuals_that_are_not_known() -> None:
     """Infinite without multipliers, with one of the wrong sign, or with a cost that is singular."""
-    one = _one_bound()
+    one = one_bound()
     right = residuals_of(one, Answer(np.ones(1), True, z_box=np.ones(1)))
     assert right.nearness < 1e-7
     assert residuals_of(one, Answer(np.ones(1), True)).nearness == np.inf
