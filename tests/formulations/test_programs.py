@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import msgspec
 import numpy as np
 import pinocchio as pin
@@ -11,48 +9,28 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from makers.problems import equation, kinematics_at, problem_at, task_jacobian, velocity_of
+from makers.problems import (
+    equation,
+    problem_at,
+    random_step,
+    random_steps,
+    task_jacobian,
+    velocity_of,
+)
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError, Infeasible, SolverFailed
 from dikbench.linear_algebra import null_space
 from dikbench.plugins.building import make_formulation
 from dikbench.problem import DikProblem
-from dikbench.problem.tasks import LinearizedTask, OrientationTask, PositionTask, PostureTask
+from dikbench.problem.tasks import LinearizedTask, OrientationTask, PositionTask
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.loading import load_robot
-from dikbench.robots.robot import Robot
 from dikbench.solvers.checked_solve import make_solve
-from dikbench.testing.states import SINGULAR
 from formulations.lp_alpha_components import twist_from_rates
 from formulations.lu_kernel import lu_kernel
-from formulations.manipulability import manipulability_gradient
 
 DT = 0.01
-
-
-def _problem(
-    robot: Robot, random: np.random.Generator, speed: float, *, second: str = "posture"
-) -> DikProblem:
-    """A random state near the robot's start with a random twist and a second task."""
-    q = pin.integrate(robot.model, robot.q0, random.uniform(-0.4, 0.4, robot.nv))
-    kinematics = kinematics_at(robot, q)
-    tasks = [equation(kinematics.jacobian(robot.frame_id), speed * random.normal(size=6))]
-    if second == "posture":
-        target = pin.integrate(robot.model, q, random.uniform(-0.3, 0.3, robot.nv))
-        tasks.append(PostureTask(target=target).linearize(kinematics))
-    elif second == "elbow":
-        X = kinematics.placement(robot.model.getFrameId("panda_link4"))
-        point = X.translation + random.uniform(-0.2, 0.2, 3)
-        elbow = PositionTask(target=point, frame="panda_link4", priority=2)
-        tasks.append(elbow.linearize(kinematics))
-    return problem_at(robot, q, tasks)
-
-
-def _problems(count: int, speed: float, second: str = "posture") -> Iterator[DikProblem]:
-    robot, random = load_robot("panda"), np.random.default_rng(0)
-    for _ in range(count):
-        yield _problem(robot, random, speed, second=second)
 
 
 # --- hierarchies
@@ -61,7 +39,7 @@ def _problems(count: int, speed: float, second: str = "posture") -> Iterator[Dik
 def test_a_hierarchy_of_one_level_is_the_weighted_program() -> None:
     """Bounds active or not."""
     for speed in (0.1, 2.0):
-        for problem in _problems(30, speed, "none"):
+        for problem in random_steps(30, speed, "none"):
             one, qp = (velocity_of(law, problem) for law in ("hqp", "qp[braking=viable]"))
             assert one == pytest.approx(qp, abs=1e-6)
 
@@ -72,7 +50,7 @@ def test_a_hierarchy_inside_the_limits_is_the_null_space_projection(second: str)
     free = load_robot("panda").with_limits(position=None, velocity=None)
     random = np.random.default_rng(1)
     for _ in range(30):
-        problem = _problem(free, random, 0.1, second=second)
+        problem = random_step(free, random, 0.1, second=second)
         hierarchy = velocity_of("hqp[damping=0]", problem)
         projection = velocity_of("nullspace", problem)
         for level in problem.levels:
@@ -85,7 +63,7 @@ def test_a_hierarchy_inside_the_limits_is_the_null_space_projection(second: str)
 @pytest.mark.parametrize("speed", [0.1, 1.0, 3.0])
 def test_the_second_level_does_not_leak_into_the_first(second: str, speed: float) -> None:
     """What level 1 reaches alone it keeps, bounds active or not, to rounding."""
-    for problem in _problems(40, speed, second):
+    for problem in random_steps(40, speed, second):
         alone = problem_at(problem.robot, problem.q, problem.tasks[:1])
         J = problem.tasks[0].J
         first = velocity_of("hqp[damping=1e-5]", alone)  # as the levels above the last have
@@ -95,7 +73,7 @@ def test_the_second_level_does_not_leak_into_the_first(second: str, speed: float
 
 def test_the_weighted_program_tends_to_the_hierarchy() -> None:
     """With weights of 1e6 to 1 the second task gives way to the first, inside the limits."""
-    for problem in _problems(20, 1.0):
+    for problem in random_steps(20, 1.0):
         first, second = problem.tasks
         heavy = LinearizedTask(first.J, first.V, first.error, 1e6)
         weighted = problem_at(problem.robot, problem.q, [heavy, second])
@@ -110,7 +88,7 @@ def test_the_weighted_program_tends_to_the_hierarchy() -> None:
 def test_three_levels_are_answered_where_bounds_bind() -> None:
     """Position, orientation and posture of a fast hand, a level hardly damped in between."""
     answered = 0
-    for drawn in _problems(60, 1.5):
+    for drawn in random_steps(60, 1.5):
         hand, posture = drawn.tasks
         position = LinearizedTask(hand.J[:3], hand.V[:3], np.zeros(3))
         orientation = LinearizedTask(hand.J[3:], hand.V[3:], np.zeros(3), priority=2)
@@ -128,10 +106,10 @@ def test_three_levels_are_answered_where_bounds_bind() -> None:
 
 def test_least_squares_in_velocity_limits_is_damped_least_squares_where_none_binds() -> None:
     """And elsewhere stays inside them, where clipping would too, with less error."""
-    for problem in _problems(30, 0.05, "none"):
+    for problem in random_steps(30, 0.05, "none"):
         qp, dls = (velocity_of(law, problem) for law in ("qp-velocity", "dls[damping=1e-3]"))
         assert qp == pytest.approx(dls, abs=1e-7)
-    for problem in _problems(30, 3.0, "none"):
+    for problem in random_steps(30, 3.0, "none"):
         task, limit = problem.primary, problem.limits.joint.velocity
         assert limit is not None
         qp = velocity_of("qp-velocity", problem)
@@ -153,7 +131,7 @@ def _alpha(problem: DikProblem, v: Array) -> float:
 def test_two_stages_go_as_far_as_one_and_nearer_to_the_posture() -> None:
     """The same alpha as the linear program; the null space serves the posture, Drake's leaks."""
     leaks = 0
-    for problem in _problems(60, 1.0):
+    for problem in random_steps(60, 1.0):
         one = velocity_of("lp-alpha[regularization=0]", problem)
         two = velocity_of("alpha-two-stage", problem)
         drake = velocity_of("drake[centering=10]", problem)
@@ -168,7 +146,7 @@ def test_two_stages_go_as_far_as_one_and_nearer_to_the_posture() -> None:
 
 def test_components_are_the_whole_where_all_is_feasible() -> None:
     """Alpha = 1 in each: J v = V."""
-    for problem in _problems(20, 0.02, "none"):
+    for problem in random_steps(20, 0.02, "none"):
         v = velocity_of("lp-alpha-components", problem)
         assert problem.primary.J @ v == pytest.approx(problem.primary.V, abs=1e-5)
 
@@ -176,7 +154,7 @@ def test_components_are_the_whole_where_all_is_feasible() -> None:
 def test_components_keep_axes_that_the_whole_would_slow_down() -> None:
     """The sum of the components is at least six times the common alpha."""
     gained = 0
-    for problem in _problems(30, 1.5, "none"):
+    for problem in random_steps(30, 1.5, "none"):
         robot, task = problem.robot, problem.primary
         kinematics = Kinematics(robot)
         kinematics.update(problem.q)
@@ -195,7 +173,7 @@ def test_components_of_an_orientation_are_roll_pitch_and_yaw() -> None:
     """Each rate of the frame is a share of the wanted one, and they add up to the most there is."""
     random = np.random.default_rng(8)
     held_back = 0
-    for drawn in _problems(20, 0.0, "none"):
+    for drawn in random_steps(20, 0.0, "none"):
         kinematics = Kinematics(drawn.robot)
         kinematics.update(drawn.q)
         R = kinematics.placement(drawn.robot.frame_id).rotation
@@ -283,87 +261,6 @@ def test_a_joint_without_acceleration_limit_at_its_position_limit_has_no_brake(l
 
 
 # --- NEO
-
-
-def test_neo_without_its_reward_is_damped_least_squares() -> None:
-    """Far from limits: min lambda ||v||^2 + ||V - J v||^2 / ||e||_1."""
-    robot = load_robot("panda").with_limits(position=None, velocity=None)
-    random = np.random.default_rng(3)
-    for _ in range(20):
-        problem = _problem(robot, random, 0.1, second="none")
-        task = problem.tasks[0]
-        task.error = random.uniform(-0.05, 0.05, 6)
-        e = float(np.abs(task.error).sum())
-        damped = velocity_of(f"dls[damping={float(np.sqrt(0.01 * e))!r}]", problem)
-        assert velocity_of("neo[manipulability_gain=0]", problem) == pytest.approx(damped, abs=1e-6)
-
-
-def test_neos_reward_raises_the_manipulability() -> None:
-    """To first order, compared with the same program without it."""
-    better = 0
-    for problem in _problems(30, 0.05, "none"):
-        problem.tasks[0].error = np.full(6, 0.1)
-        J = problem.tasks[0].J
-        gradient = manipulability_gradient(J)
-        with_it, without = (
-            velocity_of(f"neo[manipulability_gain={gain}]", problem) for gain in (1, 0)
-        )
-        better += float(gradient @ with_it) > float(gradient @ without)
-    assert better == 30
-
-
-@pytest.mark.parametrize("name", ["panda", "ur5", "kinova", "planar3r"])
-def test_manipulability_gradient_is_the_derivative(name: str) -> None:
-    """By central differences."""
-    robot, random = load_robot(name), np.random.default_rng(4)
-    kinematics, rows = Kinematics(robot), list(robot.task_rows)
-
-    def manipulability(q: Array) -> float:
-        kinematics.update(q)
-        J = kinematics.jacobian(robot.frame_id)[rows]
-        return float(np.sqrt(np.linalg.det(J @ J.T)))
-
-    for _ in range(5):
-        q = pin.integrate(robot.model, robot.q0, random.uniform(-0.5, 0.5, robot.nv))
-        kinematics.update(q)
-        found = manipulability_gradient(kinematics.jacobian(robot.frame_id)[rows].copy())
-        step = 1e-6 * np.eye(robot.nv)
-        expected = [
-            (
-                manipulability(pin.integrate(robot.model, q, s))
-                - manipulability(pin.integrate(robot.model, q, -s))
-            )
-            / 2e-6
-            for s in step
-        ]
-        assert found == pytest.approx(expected, abs=1e-8)
-
-
-@pytest.mark.parametrize("eps", [1e-2, 1e-5, 1e-8, 1e-11], ids=str)
-def test_manipulability_gradient_near_a_singularity(eps: float) -> None:
-    """On a planar arm w = l_1 l_2 |sin q_2|: next to the stretched arm it rises with q_2."""
-    robot = load_robot("planar3r")
-    kinematics, rows = Kinematics(robot), list(robot.task_rows)
-    kinematics.update(np.array([0.4, eps, 0.7]))
-    found = manipulability_gradient(kinematics.jacobian(robot.frame_id)[rows])
-    kinematics.update(np.array([0.4, np.pi / 2, 0.7]))
-    J = kinematics.jacobian(robot.frame_id)[rows]
-    slope = abs(float(np.linalg.det(J))) * np.cos(eps)  # l_1 l_2 cos q_2
-    assert found == pytest.approx([0, slope, 0], abs=1e-4 * slope)
-
-
-def test_manipulability_has_no_gradient_at_a_singularity() -> None:
-    """Where it is zero, up to rounding too, and where the rows are more than the joints."""
-    assert np.array_equal(manipulability_gradient(np.zeros((6, 7))), np.zeros(7))
-    tall = np.random.default_rng(0).normal(size=(6, 5))
-    assert np.array_equal(manipulability_gradient(tall), np.zeros(5))
-    for name, places in SINGULAR.items():
-        robot = load_robot(name)
-        kinematics = Kinematics(robot)
-        for q in places:
-            kinematics.update(np.array(q, dtype=float))
-            J = kinematics.jacobian(robot.frame_id)[list(robot.task_rows)]
-            assert np.array_equal(manipulability_gradient(J), np.zeros(robot.nv))
 
 
 # --- kernels

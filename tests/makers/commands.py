@@ -155,7 +155,7 @@ def run_all(
     """Run commands; of each a folder with `stdout`, `stderr`, `code`, and `cwd`, where it ran.
 
     They run in this process, where all is imported already, or in one of their own that finds
-    packages at a path.
+    packages at a path and makes reports without figures.
     """
     folders = [folder / str(number) for number in range(len(commands))]
     for each in folders:
@@ -172,8 +172,12 @@ def run_all(
             patch.chdir(folder)
             one_after_the_other(commands)
         return folders
-    code = "import json, sys; from makers.commands import one_after_the_other as run; "
-    command = [sys.executable, "-c", code + "run(json.loads(sys.argv[1]))", json.dumps(commands)]
+    code = (
+        "import json, sys; from makers.commands import one_after_the_other as run\n"
+        "from makers.runs import without_figures\n"
+        "with without_figures(): run(json.loads(sys.argv[1]))"
+    )
+    command = [sys.executable, "-c", code, json.dumps(commands)]
     found = os.pathsep.join([str(path), str(Path(__file__).parents[1])])
     environment = {**os.environ, "PYTHONPATH": found}
     subprocess.run(command, cwd=folder, env=environment, check=True, timeout=600)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from dikbench.problem import (
     Robot,
     program_of,
 )
+from dikbench.problem.tasks import PositionTask, PostureTask
 from dikbench.programs.quadratic_program import QuadraticProgram
 from dikbench.robots.limits import JointLimits
 from dikbench.robots.loading import load_robot
@@ -154,3 +155,28 @@ def interval_of(value: object, n: int) -> Interval | None:
         return None
     lower, upper = value if isinstance(value, tuple) else (-np.asarray(value), value)
     return Interval(*(np.broadcast_to(np.asarray(side, float), (n,)) for side in (lower, upper)))
+
+
+def random_step(
+    robot: Robot, random: np.random.Generator, speed: float, *, second: str = "posture"
+) -> DikProblem:
+    """A random state near the robot's start with a random twist and a second task."""
+    q = pin.integrate(robot.model, robot.q0, random.uniform(-0.4, 0.4, robot.nv))
+    kinematics = kinematics_at(robot, q)
+    tasks = [equation(kinematics.jacobian(robot.frame_id), speed * random.normal(size=6))]
+    if second == "posture":
+        target = pin.integrate(robot.model, q, random.uniform(-0.3, 0.3, robot.nv))
+        tasks.append(PostureTask(target=target).linearize(kinematics))
+    elif second == "elbow":
+        X = kinematics.placement(robot.model.getFrameId("panda_link4"))
+        point = X.translation + random.uniform(-0.2, 0.2, 3)
+        elbow = PositionTask(target=point, frame="panda_link4", priority=2)
+        tasks.append(elbow.linearize(kinematics))
+    return problem_at(robot, q, tasks)
+
+
+def random_steps(count: int, speed: float, second: str = "posture") -> Iterator[DikProblem]:
+    """Random states of a Panda (see `random_step`), always the same ones."""
+    robot, random = load_robot("panda"), np.random.default_rng(0)
+    for _ in range(count):
+        yield random_step(robot, random, speed, second=second)

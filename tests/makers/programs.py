@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import Final
 
 import numpy as np
 import pytest
 
 from dikbench.arrays import Array
+from dikbench.errors import CannotAnswer
+from dikbench.programs.answer import Answer
 from dikbench.programs.quadratic_program import ProgramKind, QuadraticProgram
 from dikbench.solvers.catalogue.back_ends import BACK_ENDS, is_installed, parse_solver
 from dikbench.solvers.checked_solve import CheckedSolve, make_solve
+from dikbench.solvers.recheck.residuals import Residuals, residuals
+from dikbench.solvers.recheck.stack import Stack
 
 LIBRARIES_WARN: Final = [
     pytest.mark.filterwarnings(r"ignore::UserWarning:qpsolvers\."),
@@ -68,3 +73,41 @@ def no_point() -> QuadraticProgram:
     return QuadraticProgram(
         np.eye(2), np.zeros(2), A=A, b=np.array([3.0]), lb=-np.ones(2), ub=np.ones(2)
     )
+
+
+def residuals_of(program: QuadraticProgram, answer: Answer) -> Residuals:
+    """The residuals of one answer, (1,) each."""
+    found = residuals(Stack([program], [answer]))
+    for part in ("primal", "dual", "gap", "nearness"):
+        assert getattr(found, part).shape == (1,), part
+    return found
+
+
+def one_bound() -> QuadraticProgram:
+    """Min 1/2 x^2 - 2 x on [0, 1]: x = 1 with the multiplier 1 of the upper bound."""
+    return QuadraticProgram(np.eye(1), np.array([-2.0]), lb=np.zeros(1), ub=np.ones(1))
+
+
+class ScriptedSolver:
+    """A back end that reads its answers off a list, and notes from which call they were asked."""
+
+    def __init__(self, *answers: Answer) -> None:
+        self.answers = list(answers)
+        self.sites: list[int] = []
+
+    def __call__(self, program: object, site: int) -> Answer:
+        """Return the next answer."""
+        self.sites.append(site)
+        return self.answers.pop(0)
+
+
+def said(x: float, multiplier: float | None = None, *, claimed: bool = True) -> Answer:
+    """Make an answer to `one_bound`, with the multiplier of its bounds where it is known."""
+    z_box = None if multiplier is None else np.array([multiplier])
+    return Answer(np.array([x]), claimed, z_box=z_box, core_ns=1000)
+
+
+def ask(solve: CheckedSolve, program: QuadraticProgram) -> None:
+    """Solve a program, whatever comes of it."""
+    with contextlib.suppress(CannotAnswer):
+        solve(program)

@@ -1,4 +1,4 @@
-"""Studies whose trials run in the process of the test: a worker takes a second to start."""
+"""Studies whose trials run in the process of the test: a worker takes seconds to start."""
 
 from __future__ import annotations
 
@@ -6,17 +6,21 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import msgspec
 import pytest
 
 from dikbench.report import write
+from dikbench.report.interactive import replays
 from dikbench.results.folder import ResultsFolder
 from dikbench.run import in_workers, recompute, runner
 from dikbench.run.in_workers import RunSettings
 from dikbench.run.runner import run_study
 from dikbench.study.study import Study, TimingSettings
+
+UNEQUAL: Final = ["wall_time_s", "control_time_s", "described"]
+"""What may differ between two runs of the same trials."""
 
 
 class _NoPool:
@@ -41,19 +45,26 @@ def _no_workers(*given: object) -> Iterator[_NoPool]:
 
 @contextmanager
 def without_workers() -> Iterator[None]:
-    """Have the harness run, time and recompute trials in this process meanwhile."""
+    """Have the harness run, time, recompute and replay trials in this process meanwhile."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in (in_workers, runner, recompute):
+        for module in (in_workers, runner, recompute, replays):
             patch.setattr(module, "workers", _no_workers)
+        yield
+
+
+@contextmanager
+def not_played() -> Iterator[None]:
+    """Have reports made without what is played: half of their time."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(write, "embed", lambda *given: None)
         yield
 
 
 @contextmanager
 def without_figures() -> Iterator[None]:
     """Have reports made without their figures and what is played: most of their time."""
-    with pytest.MonkeyPatch.context() as patch:
+    with not_played(), pytest.MonkeyPatch.context() as patch:
         patch.setattr(write, "draw_figures", lambda *given: [])
-        patch.setattr(write, "embed", lambda *given: None)
         yield
 
 

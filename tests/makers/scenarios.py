@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping
 from functools import cache, lru_cache
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import pinocchio as pin
@@ -31,6 +31,7 @@ from dikbench.simulation.closed_loop import Run, simulate
 from dikbench.simulation.status import Status
 from dikbench.solvers.checked_solve import CheckedSolve, make_solve
 from makers.problems import solve_for
+from scenarios import SCENARIOS
 from scenarios.singular_postures import SINGULAR_POSTURES, SingularPosture
 
 RATE = np.array([0.5, -0.4, 0.6])
@@ -42,6 +43,10 @@ TWENTY_SEEDS = [range(2), pytest.param(range(2, 21), marks=pytest.mark.long)]
 
 scenario_of = lru_cache(maxsize=256)(make_scenario)
 """Makes the scenario of a selector and a seed once, for tests that only look at it."""
+
+
+CLOSED: Final = [name for name in SCENARIOS if name != "csv"]
+"""Families that need nothing from outside; the others have tests of their own."""
 
 
 def planar_scenario(

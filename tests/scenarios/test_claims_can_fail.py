@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from makers.scenarios import CLOSED
 
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_scenario
@@ -67,7 +68,6 @@ ELSEWHERE: Mapping[str, set[str]] = {
 }
 """Claims whose blunted scenarios are in the tests of their families."""
 
-CLOSED = [name for name in SCENARIOS if name != "csv"]
 
 SLOW = ("humanoid", "obstacle")
 """Families that take long to make many times."""

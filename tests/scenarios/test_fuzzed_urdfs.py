@@ -100,7 +100,7 @@ CASES: dict[str, Any] = {
 suppressed = [HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
 
 
-@settings(max_examples=1500, deadline=None, suppress_health_check=suppressed)
+@settings(max_examples=500, deadline=None, suppress_health_check=suppressed)
 @given(**CASES)
 def test_any_arm_makes_a_scenario_or_one_line(tmp_path: Path, **case: Any) -> None:
     """Whose start is inside the limits of all joints, at every seed."""

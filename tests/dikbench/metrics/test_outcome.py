@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from scipy.signal import find_peaks
 
 from dikbench.arrays import Array
 from dikbench.metrics import Judgement, Outcome, Verdict, evaluate, judge, motion_of
@@ -104,6 +103,8 @@ def shaking_steps(trace: Trace, scenario: Scenario) -> set[int]:
     """Find the steps in which a joint reverses five times in 0.2 s, each by 1 % of its limit."""
     found: set[int] = set()
     limit = scenario.robot.limits.velocity
+    from scipy.signal import find_peaks  # takes a second, of each process that collects tests
+
     assert limit is not None
     speeds = np.vstack([scenario.v0, trace.applied]) / limit.upper
     for v in speeds.T:

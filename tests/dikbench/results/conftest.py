@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+from makers import short_study
 from makers.runs import run_here
 from makers.shared import made_once
 
@@ -39,3 +40,13 @@ def committed(stored: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("trials.csv", "trials.parquet", "timing.csv", "manifest.json"):
         shutil.copy(stored / name, committed)
     return committed
+
+
+@pytest.fixture(scope="session")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The results of a few short trials, run once and left alone."""
+    return made_once(
+        tmp_path_factory,
+        "undisturbed",
+        lambda folder: run_here(short_study.STUDY, folder, RunSettings(jobs=2), "a test"),
+    )

@@ -8,11 +8,13 @@ import shutil
 import sqlite3
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pandas as pd
 import pytest
 from makers.rows import make_rows, write_results
+from makers.runs import without_figures
 
 import dikbench
 from dikbench.errors import DikbenchError
@@ -22,9 +24,10 @@ from dikbench.results.reading import read_results
 
 
 @pytest.fixture
-def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A report has no figures meanwhile."""
-    monkeypatch.setattr("dikbench.report.write.draw_figures", lambda *given: [])
+def undrawn() -> Iterator[None]:
+    """A report has no figures meanwhile, and nothing is played."""
+    with without_figures():
+        yield
 
 
 def test_committed_results_read_like_the_store(stored: Path, committed: Path) -> None:

@@ -46,7 +46,7 @@ def test_the_shipped_studies_share_no_instance() -> None:
 
 
 def _changed(**changes: object) -> Study:
-    selection = Selection(**changes)  # type: ignore[arg-type]
+    selection = Selection(scenarios=("reach",), **changes)  # type: ignore[arg-type]
     return select(load_study("train"), selection, named=True)
 
 

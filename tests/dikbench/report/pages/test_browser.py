@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 import json
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from makers.browser import BROWSER, DRIVER
 from makers.rows import make_rows, write_results
 
 from dikbench.report.write import write_report
 
-webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
-from selenium.webdriver.chrome.service import Service  # noqa: E402
-from selenium.webdriver.common.by import By  # noqa: E402
-from selenium.webdriver.common.keys import Keys  # noqa: E402
-from selenium.webdriver.support.ui import WebDriverWait  # noqa: E402
+pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.ui import WebDriverWait
 
-BROWSER = next(
-    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), ""
-)
-DRIVER = shutil.which("chromedriver") or ""
 pytestmark = pytest.mark.skipif(
     not (BROWSER and DRIVER), reason="no chromium with its driver is installed"
 )
@@ -35,17 +30,6 @@ ERRORS = {
     "formulation 5": 20.0,
 }
 """Distances from the path [m] whose order as texts is another than as numbers."""
-
-OPTIONS = (
-    "--headless",
-    "--no-sandbox",  # the tests may be run by root
-    "--disable-gpu",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--no-first-run",
-    "--window-size=1280,900",
-)
 
 
 @pytest.fixture(scope="module")
@@ -64,19 +48,6 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_results(folder, make_rows(formulations, ("reach", "near-miss[miss=0.02]"), seeds=(0, 1)))
     write_report(folder)
     return folder / "report.html"
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    """A browser with a profile of its own."""
-    options = webdriver.ChromeOptions()
-    for option in (*OPTIONS, f"--user-data-dir={tmp_path_factory.mktemp('profile')}"):
-        options.add_argument(option)
-    options.binary_location = BROWSER
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    driver = webdriver.Chrome(options=options, service=Service(DRIVER))
-    yield driver
-    driver.quit()
 
 
 @pytest.fixture

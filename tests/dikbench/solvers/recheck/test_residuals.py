@@ -6,13 +6,12 @@ import math
 
 import numpy as np
 import pytest
-from makers.programs import LIBRARIES_WARN, mixture
+from makers.programs import LIBRARIES_WARN, mixture, one_bound, residuals_of
 
-from dikbench.arrays import Array
 from dikbench.programs.answer import Answer
 from dikbench.programs.quadratic_program import QuadraticProgram
 from dikbench.solvers.catalogue.presets import TOLERANCES
-from dikbench.solvers.recheck.residuals import Residuals, residuals
+from dikbench.solvers.recheck.residuals import residuals
 from dikbench.solvers.recheck.stack import Stack
 
 pytestmark = LIBRARIES_WARN
@@ -22,21 +21,13 @@ TOLERANCE = TOLERANCES["default"]
 MANY = 48
 
 
-def _of(program: QuadraticProgram, answer: Answer) -> Residuals:
-    """The residuals of one answer, (1,) each."""
-    found = residuals(Stack([program], [answer]))
-    for part in ("primal", "dual", "gap", "nearness"):
-        assert getattr(found, part).shape == (1,), part
-    return found
-
-
 def test_residuals_of_the_right_answer_are_zero() -> None:
     """The optimum that was put together from its multipliers, with these multipliers."""
     program, x = mixture()
     answer = Answer(
         x, True, y=np.array([-1.0]), z=np.array([0.5]), z_box=np.array([2.0, -3.0, 0.0])
     )
-    found = _of(program, answer)
+    found = residuals_of(program, answer)
     assert found.primal == pytest.approx(0.0, abs=1e-15)
     assert found.dual == pytest.approx(0.0, abs=1e-15)
     assert found.gap == pytest.approx(0.0, abs=1e-15)
@@ -57,12 +48,7 @@ def test_the_primal_residual_is_the_worst_violation(x: list[float], primal: floa
     """Of equalities, inequalities and bounds alike."""
     program, _ = mixture()
     answer = Answer(np.array(x), True, np.zeros(1), np.zeros(1), np.zeros(3))
-    assert _of(program, answer).primal == pytest.approx(primal)
-
-
-def _one_bound() -> QuadraticProgram:
-    """Min 1/2 x^2 - 2 x on [0, 1]: x = 1 with the multiplier 1 of the upper bound."""
-    return QuadraticProgram(np.eye(1), np.array([-2.0]), lb=np.zeros(1), ub=np.ones(1))
+    assert residuals_of(program, answer).primal == pytest.approx(primal)
 
 
 @pytest.mark.parametrize(
@@ -78,7 +64,7 @@ def test_dual_residual_and_gap_of_a_bound(
     x: float, multiplier: float, dual: float, gap: float
 ) -> None:
     """By hand: |x - 2 + z| and |x (x - 2) + ub z+ + lb z-|."""
-    found = _of(_one_bound(), Answer(np.array([x]), True, z_box=np.array([multiplier])))
+    found = residuals_of(one_bound(), Answer(np.array([x]), True, z_box=np.array([multiplier])))
     assert found.dual == pytest.approx(dual)
     assert found.gap == pytest.approx(gap)
     assert found.within(TOLERANCE) == (dual == gap == 0.0)
@@ -87,7 +73,7 @@ def test_dual_residual_and_gap_of_a_bound(
 def test_a_negative_multiplier_of_an_inequality_is_a_dual_residual() -> None:
     """-x <= 0 with min 1/2 x^2 - x: stationary at x = 0 with z = -1, which pulls, not pushes."""
     program = QuadraticProgram(np.eye(1), np.array([-1.0]), -np.eye(1), np.zeros(1))
-    found = _of(program, Answer(np.zeros(1), True, z=np.array([-1.0])))
+    found = residuals_of(program, Answer(np.zeros(1), True, z=np.array([-1.0])))
     assert found.primal == 0
     assert found.dual == pytest.approx(1.0)
     assert not found.within(TOLERANCE)
@@ -98,10 +84,10 @@ def test_a_multiplier_of_an_infinite_bound_is_a_dual_residual(sign: int) -> None
     """Stationary through a bound that does not exist: caught, and nothing becomes NaN."""
     inf = np.array([np.inf])
     program = QuadraticProgram(np.eye(1), np.array([-2.0 * sign]), lb=-inf, ub=inf)
-    found = _of(program, Answer(np.zeros(1), True, z_box=np.array([2.0 * sign])))
+    found = residuals_of(program, Answer(np.zeros(1), True, z_box=np.array([2.0 * sign])))
     assert found.dual == pytest.approx(2.0)
     assert found.gap == 0.0
-    right = _of(program, Answer(np.array([2.0 * sign]), True, z_box=np.zeros(1)))
+    right = residuals_of(program, Answer(np.array([2.0 * sign]), True, z_box=np.zeros(1)))
     assert [right.primal, right.dual, right.gap] == [0.0, 0.0, 0.0]
 
 
@@ -110,14 +96,14 @@ def test_an_infinite_side_of_an_inequality_does_not_count() -> None:
     program = QuadraticProgram(
         np.eye(1), np.array([-2.0]), np.ones((2, 1)), np.array([np.inf, 1.0])
     )
-    found = _of(program, Answer(np.ones(1), True, z=np.array([0.0, 1.0])))
+    found = residuals_of(program, Answer(np.ones(1), True, z=np.array([0.0, 1.0])))
     assert [found.primal, found.dual, found.gap] == [0.0, 0.0, 0.0]
 
 
 def test_dual_residuals_are_relative_to_the_cost() -> None:
     """A cost 100 times as large has a gradient 100 times as large for the same error in x."""
     small, large = (
-        _of(
+        residuals_of(
             QuadraticProgram(scale * np.eye(1), np.array([-scale]), lb=-np.ones(1), ub=np.ones(1)),
             Answer(np.array([0.5]), True, z_box=np.zeros(1)),
         )
@@ -130,12 +116,12 @@ def test_dual_residuals_are_relative_to_the_cost() -> None:
 
 def test_unknown_multipliers_leave_the_dual_unknown() -> None:
     """NaN, and the verdict rests on the primal residual alone."""
-    found = _of(_one_bound(), Answer(np.array([1.0]), True))
+    found = residuals_of(one_bound(), Answer(np.array([1.0]), True))
     assert found.primal == 0.0
     assert math.isnan(found.dual[0])
     assert math.isnan(found.gap[0])
     assert found.within(TOLERANCE)
-    assert not _of(_one_bound(), Answer(np.array([1.1]), True)).within(TOLERANCE)
+    assert not residuals_of(one_bound(), Answer(np.array([1.1]), True)).within(TOLERANCE)
 
 
 @pytest.mark.parametrize("excess", [0.5, 2.0])
@@ -143,7 +129,7 @@ def test_the_tolerance_of_verification(excess: float) -> None:
     """At most the tolerance of violation is accepted, whichever it is."""
     for tolerance in TOLERANCES.values():
         x = np.array([1.0 + excess * tolerance])
-        assert _of(_one_bound(), Answer(x, True)).within(tolerance) == (excess < 1)
+        assert residuals_of(one_bound(), Answer(x, True)).within(tolerance) == (excess < 1)
 
 
 # --- many at once
@@ -161,7 +147,7 @@ def test_a_stack_gives_each_answer_its_own_residuals() -> None:
         pushes = scale * (np.array([-1.0, 0.5, 2.0, -3.0, 0.0]) + wrong[3:])
         answers.append(Answer(x + wrong[:3], k % 2 == 0, pushes[:1], pushes[1:2], pushes[2:]))
     stacked = residuals(Stack(programs, answers))
-    alone = [_of(p, a) for p, a in zip(programs, answers, strict=True)]
+    alone = [residuals_of(p, a) for p, a in zip(programs, answers, strict=True)]
     for part in ("primal", "dual", "gap"):
         one_by_one = [getattr(found, part)[0] for found in alone]
         assert getattr(stacked, part) == pytest.approx(one_by_one, rel=1e-9, abs=1e-13), part
@@ -184,147 +170,6 @@ def _scaled(program: QuadraticProgram, scale: float) -> QuadraticProgram:
 # --- how near the optimum an answer must be
 
 
-class _Known:
-    """A random program that was put together from its optimum, and a point well inside of it.
-
-    Attributes:
-        program: the program.
-        x: the optimum; unique where the cost is strictly convex.
-        inside: a feasible point whose distance to every inequality is positive.
-        y, z, z_box: the multipliers of x.
-    """
-
-    def __init__(self, random: np.random.Generator, P: Array) -> None:
-        n, m, p = len(P), 1, 2
-        self.x = random.uniform(-1, 1, n)
-        A = random.normal(size=(m, n))
-        off = random.uniform(-0.5, 0.5, n)
-        self.inside = self.x + off - A.T @ np.linalg.solve(A @ A.T, A @ off)
-        # A row is active where it may be, and then looks away from the point inside.
-        G = random.normal(size=(p, n))
-        G *= -np.sign(G @ (self.inside - self.x))[:, None]
-        active = np.array([True, False])
-        h = G @ self.x + np.where(active, 0.0, 1.0)
-        to_inside = self.inside - self.x
-        bounded = random.random(n) < 0.5
-        lower = np.where(bounded & (to_inside > 0), self.x, -3.0)
-        upper = np.where(bounded & (to_inside < 0), self.x, 3.0)
-        self.y = random.normal(size=m)
-        self.z = np.where(active, random.uniform(0.1, 2, p), 0.0)
-        self.z_box = -np.sign(to_inside) * np.where(bounded, random.uniform(0.1, 2, n), 0.0)
-        q = -(P @ self.x + A.T @ self.y + G.T @ self.z + self.z_box)
-        self.program = QuadraticProgram(P, q, G, h, A, A @ self.x, lower, upper)
-
-    def answer(self, x: Array) -> Answer:
-        """This x with the exact multipliers."""
-        return Answer(x, True, self.y, self.z, self.z_box)
-
-    def beside(self, random: np.random.Generator, x: Array, size: float) -> Answer:
-        """This x with other multipliers of the right signs."""
-        y, z, z_box = (v + size * random.normal(size=v.shape) for v in (self.y, self.z, self.z_box))
-        z_box = np.where(self.z_box * z_box > 0, z_box, 0.0)
-        return Answer(x, True, y, np.maximum(z, 0.0), z_box)
-
-    def distance(self, x: Array) -> float:
-        """What `nearness` bounds: the way to the optimum where it is unique, else the cost."""
-        if np.diagonal(self.program.P).all():
-            return float(np.abs(x - self.x).max())
-        cost, best = (0.5 * p @ self.program.P @ p + self.program.q @ p for p in (x, self.x))
-        return abs(float(cost - best))
-
-
-def _definite(random: np.random.Generator, n: int) -> Array:
-    """Eigenvalues over four decades."""
-    Q = np.linalg.qr(random.normal(size=(n, n)))[0]
-    P: Array = (Q * 10.0 ** random.uniform(-3, 1, n)) @ Q.T
-    return (P + P.T) / 2
-
-
-def _linear(random: np.random.Generator, n: int) -> Array:
-    """No cost in some directions at all, such as the velocities of alpha scaling; or in none."""
-    P = np.zeros((n, n))
-    some = int(random.integers(0, n))
-    P[:some, :some] = _definite(random, some) if some else 0.0
-    return P
-
-
-SIZES = (0.0, 1e-12, 1e-9, 1e-7, 1e-5, 1e-3, 0.1, 1.0)
-COSTS = {"strictly-convex": _definite, "linear": _linear}
-
-
-def _all_known(cost: str, seed: int) -> tuple[np.random.Generator, list[_Known]]:
-    """Many programs of one structure."""
-    random = np.random.default_rng([seed, len(cost)])
-    return random, [_Known(random, COSTS[cost](random, 5)) for _ in range(MANY)]
-
-
-def _assert_bounded(found: Residuals, distances: list[float]) -> None:
-    assert np.isfinite(found.nearness).all()
-    assert np.all(found.nearness * (1 + 1e-3) + 1e-9 >= distances)
-
-
-@pytest.mark.parametrize("cost", COSTS)
-@pytest.mark.parametrize("seed", range(3))
-def test_the_known_optima_are_what_they_are_said_to_be(cost: str, seed: int) -> None:
-    """Their residuals vanish, some bounds and inequalities push, and `inside` is feasible."""
-    _, known = _all_known(cost, seed)
-    for k in known:
-        right = _of(k.program, k.answer(k.x))
-        assert max(right.primal[0], right.dual[0], right.gap[0]) < 1e-12
-        assert _of(k.program, k.answer(k.inside)).primal < 1e-12
-    assert np.mean([np.count_nonzero(k.z_box) for k in known]) > 1
-
-
-@pytest.mark.parametrize("cost", COSTS)
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("size", SIZES)
-def test_no_feasible_answer_is_farther_than_its_nearness(cost: str, seed: int, size: float) -> None:
-    """On the way from the optimum to a point inside, exact multipliers: never too near.
-
-    At the optimum itself, and next to it, the bound is next to nothing.
-    """
-    _, known = _all_known(cost, seed)
-    x = [k.x + size * (k.inside - k.x) for k in known]
-    answers = [k.answer(there) for k, there in zip(known, x, strict=True)]
-    found = residuals(Stack([k.program for k in known], answers))
-    distances = [k.distance(there) for k, there in zip(known, x, strict=True)]
-    if size == 1.0:
-        assert min(distances) > 1e-3
-    _assert_bounded(found, distances)
-    if size <= 1e-12:
-        # The square root of rounding over the smallest eigenvalue, or of the slack of the active.
-        assert found.nearness.max() < (1e-4 if cost == "strictly-convex" else 1e-10)
-
-
-@pytest.mark.parametrize("cost", COSTS)
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("size", SIZES)
-def test_nor_with_other_multipliers(cost: str, seed: int, size: float) -> None:
-    """Multipliers of the right signs, but wrong otherwise, make the bound larger, never too small.
-
-    (At an upper bound for instance: no push at it at all, or one that is too strong.)
-    """
-    random, known = _all_known(cost, seed)
-    for step in (0.0, 1e-6, 0.3):
-        x = [k.x + step * (k.inside - k.x) for k in known]
-        answers = [k.beside(random, there, size) for k, there in zip(known, x, strict=True)]
-        found = residuals(Stack([k.program for k in known], answers))
-        _assert_bounded(found, [k.distance(there) for k, there in zip(known, x, strict=True)])
-
-
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("size", SIZES)
-def test_nor_is_an_answer_that_passes_a_bound(seed: int, size: float) -> None:
-    """An x beside the optimum in any direction, feasible or not, exact multipliers."""
-    random, known = _all_known("strictly-convex", seed)
-    x = [k.x + size * random.normal(size=5) for k in known]
-    answers = [k.answer(there) for k, there in zip(known, x, strict=True)]
-    found = residuals(Stack([k.program for k in known], answers))
-    if size == 1e-3:
-        assert found.primal.min() > 1e-5
-    _assert_bounded(found, [k.distance(there) for k, there in zip(known, x, strict=True)])
-
-
 def test_one_soft_cost_among_stiff_ones_is_not_hidden_by_them() -> None:
     """One in 16 is looked at first; one beside it that is 10^6 times as flat still counts."""
     stiff, soft = (
@@ -342,19 +187,22 @@ def test_one_soft_cost_among_stiff_ones_is_not_hidden_by_them() -> None:
 
 def test_nothing_follows_from_residuals_that_are_not_known() -> None:
     """Infinite without multipliers, with one of the wrong sign, or with a cost that is singular."""
-    one = _one_bound()
-    right = _of(one, Answer(np.ones(1), True, z_box=np.ones(1)))
+    one = one_bound()
+    right = residuals_of(one, Answer(np.ones(1), True, z_box=np.ones(1)))
     assert right.nearness < 1e-7
-    assert _of(one, Answer(np.ones(1), True)).nearness == np.inf
+    assert residuals_of(one, Answer(np.ones(1), True)).nearness == np.inf
     inequality = QuadraticProgram(np.eye(1), np.array([-1.0]), -np.eye(1), np.zeros(1))
     pulled = Answer(np.zeros(1), True, z=np.array([-1.0]))
-    assert _of(inequality, pulled).nearness == np.inf
+    assert residuals_of(inequality, pulled).nearness == np.inf
     endless = QuadraticProgram(np.eye(1), np.array([-2.0]), lb=np.zeros(1), ub=np.array([np.inf]))
     vain = Answer(np.zeros(1), True, z_box=np.array([2.0]))
-    assert _of(endless, vain).nearness == np.inf
+    assert residuals_of(endless, vain).nearness == np.inf
     flat = QuadraticProgram(np.ones((2, 2)), np.zeros(2), lb=-np.ones(2), ub=np.ones(2))
-    assert _of(flat, Answer(np.array([0.5, -0.5]), True, z_box=np.zeros(2))).nearness == np.inf
-    lost = _of(one, Answer(np.array([np.nan]), True, z_box=np.zeros(1)))
+    assert (
+        residuals_of(flat, Answer(np.array([0.5, -0.5]), True, z_box=np.zeros(2))).nearness
+        == np.inf
+    )
+    lost = residuals_of(one, Answer(np.array([np.nan]), True, z_box=np.zeros(1)))
     assert lost.nearness == np.inf
     line = QuadraticProgram(np.zeros((1, 1)), np.zeros(1), lb=np.zeros(1))
-    assert _of(line, Answer(np.ones(1), True, z_box=np.zeros(1))).nearness == np.inf
+    assert residuals_of(line, Answer(np.ones(1), True, z_box=np.zeros(1))).nearness == np.inf
