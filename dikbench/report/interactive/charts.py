@@ -21,6 +21,9 @@ DEVIATIONS: Final = 1.96
 
 GOOD: Final = "#0B7A75"
 OTHER: Final = "#8a8f98"
+TIED: Final = "#17978F"
+"""`GOOD`, seen on a dark ground as well where it is thin or pale."""
+
 CHOSEN: Final = "#B4468F"
 BAD: Final = "#C8502B"
 
@@ -181,7 +184,7 @@ def matrix(
     scale = alt.Scale(domain=[0, 1.42], nice=False)
     rates = ranked(controls, drawn).transform_calculate(sorted="datum.rounded", zero="0")
     y = alt.Y("contender:N", axis=lines, sort=by_success)
-    colour = alt.condition("datum.tied==1", alt.value(GOOD), alt.value(OTHER))
+    colour = alt.condition("datum.tied==1", alt.value(TIED), alt.value(OTHER))
     tooltip = [
         NAMED,
         alt.Tooltip("rate:Q", format=".1%", title="success"),
@@ -194,7 +197,7 @@ def matrix(
     ]
     overall = alt.layer(
         _heading([("Overall", 0.0)], scale),
-        rates.mark_rule(strokeWidth=9, opacity=0.28).encode(
+        rates.mark_rule(strokeWidth=9, opacity=0.35).encode(
             alt.X("zero:Q", scale=scale, axis=None), alt.X2("rate:Q"), y=y, color=colour
         ),
         rates.mark_rule(strokeWidth=2, opacity=0.8).encode(

@@ -28,6 +28,9 @@ INSTANTS: Final = 150
 STEPS_PER_UNIT: Final = 1e4
 """What is embedded is rounded to 1e-4 (rad, m, 1)."""
 
+POSES_IN_VIEW: Final = 8
+"""Configurations of each run, about, that the camera takes into view."""
+
 LONGEST_S: Final = 60.0
 """For all runs of one formulation, which ended before: no more than a guard."""
 
@@ -49,6 +52,11 @@ def make_replays(trials: pd.DataFrame, rows: pd.DataFrame) -> dict[str, Any]:
     for row in same_here(records):
         of_formulation.setdefault(row["formulation"], []).append(row)
     runs = _in_workers(list(of_formulation.values()))
+    in_view: dict[tuple[str, int], list[Array]] = {}
+    for row in records:
+        if row["id"] in runs:
+            q = runs[row["id"]].pop("in_view")
+            in_view.setdefault((row["scenario"], int(row["seed"])), []).append(q)
     cases: dict[tuple[str, int], tuple[int, dict[str, Any]]] = {}
     robots: dict[tuple[str, str], StaticScene | None] = {}
     drawn = has_viser()
@@ -65,7 +73,8 @@ def make_replays(trials: pd.DataFrame, rows: pd.DataFrame) -> dict[str, Any]:
             robot = scenario.robot.name, scenario.robot.frame
             if robot not in robots:
                 robots[robot] = static_scene(scenario.robot) if drawn else None
-            cases[key] = len(cases), _case(scenario, [*robots].index(robot), drawn=drawn)
+            number, q = [*robots].index(robot), np.vstack(in_view[key])
+            cases[key] = len(cases), _case(scenario, number, q, drawn=drawn)
         group = groups.setdefault((*key, row["plant"], row["reference"]), len(groups))
         runs[row["id"]] |= {"case": cases[key][0], "group": group}
     return {
@@ -104,8 +113,8 @@ def described_runs(rows: list[Mapping[str, Any]]) -> dict[str, Any]:
     return {each.id: _run(each) for each in run_again(rows)}
 
 
-def _case(scenario: Scenario, robot: int, *, drawn: bool) -> dict[str, Any]:
-    around = surroundings(scenario) if drawn else None
+def _case(scenario: Scenario, robot: int, q: Array, *, drawn: bool) -> dict[str, Any]:
+    around = surroundings(scenario, q) if drawn else None
     return {
         "robot": robot,
         "certificate": [str(claim) for claim in scenario.certificate.claims],
@@ -121,10 +130,11 @@ def _run(again: RunAgain) -> dict[str, Any]:
         dt: control period [s]; step: numbers of the instants, ascending; columns: the coordinates
         of the joints (see `joint_coordinates`), then x, y, z [m] and the quaternion of the target,
         as differences from instant to instant in units of 1e-4; near: for each instant a digit per
-        joint (see `joint_nearness`); worst: the time of the largest error [s]; error: distance to
-        the target, a rotation counted at
-        0.2 m [mm]; speed: the largest since the instant before over its limit; margin: the smallest
-        to a position limit [deg; 57.3 per m where a joint slides]; null where there is no limit.
+        joint (see `joint_nearness`); in_view: configurations that a camera is to
+        see; worst: the time of the largest error [s]; error: distance to the target, a rotation
+        counted at 0.2 m [mm]; speed: the largest since the instant before over its limit; margin:
+        the smallest to a position limit [deg; 57.3 per m where a joint slides]; null where there is
+        no limit.
     """
     trace, scenario = again.run.trace, again.scenario
     steps = np.unique(np.linspace(0, trace.steps, min(INSTANTS, trace.steps + 1)).astype(int))
@@ -136,6 +146,7 @@ def _run(again: RunAgain) -> dict[str, Any]:
         "step": steps.tolist(),
         "columns": _differences(np.hstack([coordinates, targets])),
         "near": ["".join(map(str, row)) for row in near.tolist()],
+        "in_view": trace.q[steps[:: max(1, len(steps) // POSES_IN_VIEW)]],
         "worst": round(trace.dt * int(steps[np.argmax(np.nan_to_num(series["error"], nan=-1))]), 6),
         **{
             name: [None if not np.isfinite(x) else round(float(x), 3) for x in values]

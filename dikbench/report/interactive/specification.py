@@ -57,7 +57,8 @@ def make_charts(rows: pd.DataFrame) -> Charts:
         up, _, across = named.partition(" over ")
         pictures.append(phase(asked, across, up))
     if rows["swept"].ne("").any():
-        pictures.append(sensitivity(asked))
+        swept = sorted(set(rows["swept"]) - {""})
+        pictures.append(sensitivity(asked, swept[0] if len(swept) == 1 else "a parameter"))
     drawn = default_intervals(rows, asked)
     tables = [
         table.mark_text(fontSize=0).encode(text="order:Q").properties(width=1, height=1, name=name)
@@ -80,7 +81,7 @@ def make_charts(rows: pd.DataFrame) -> Charts:
         .configure(background="transparent", padding=0)
         .configure_view(stroke=None)
         .configure_axis(
-            labelColor="currentColor", titleColor="currentColor", gridOpacity=0.35,
+            labelColor="currentColor", titleColor="currentColor", gridColor="#8884",
             domainColor="#8888", tickColor="#8888", labelFontSize=11, titleFontSize=12,
             titleFontWeight="normal",
         )

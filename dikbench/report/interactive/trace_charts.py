@@ -8,7 +8,7 @@ from typing import Any, Final
 import altair as alt
 import vl_convert
 
-from dikbench.report.interactive.charts import BAD, CHOSEN, GOOD
+from dikbench.report.interactive.charts import BAD, CHOSEN, TIED
 from dikbench.report.interactive.specification import EMBEDDING, VEGA_LITE
 
 SERIES: Final = (
@@ -34,7 +34,7 @@ def trace_charts() -> dict[str, Any]:
         .add_params(alt.param("cursor", value=0))
         .configure(background="transparent")
         .configure_view(stroke=None)
-        .configure_axis(labelColor="currentColor", titleColor="currentColor", gridOpacity=0.35,
+        .configure_axis(labelColor="currentColor", titleColor="currentColor", gridColor="#8884",
                         titleFontWeight="normal")
         .configure_legend(labelColor="currentColor", labelLimit=0)
     )  # fmt: skip
@@ -54,7 +54,7 @@ def _lines(name: str, title: str, limit: float | None) -> Any:
         alt.X("t:Q", title="time [s]" if last else None),
         alt.Y(f"{name}:Q", title=title),
         color=alt.Color(
-            "contender:N", legend=legend, sort=None, scale=alt.Scale(range=[GOOD, CHOSEN])
+            "contender:N", legend=legend, sort=None, scale=alt.Scale(range=[TIED, CHOSEN])
         ),
     )
     cursor = (

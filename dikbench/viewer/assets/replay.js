@@ -36,7 +36,7 @@ function drawLine(frame, name, points, colour) {
 function moveRobot(frame, joints, c, colours = []) {
   const coloured = (frame.coloured ??= {});
   joints.forEach((joint, k) => {
-    moveNode(frame, joint.node, poseOf(joint, c));
+    moveNode(frame, joint.node, jointPose(joint, c));
     if (!joint.body || !colours[k] || coloured[joint.body] === colours[k]) return;
     coloured[joint.body] = colours[k];
     send(frame, [{ type: "SceneNodeUpdateMessage", name: joint.body, updates: { color: colours[k] } }]);
@@ -44,7 +44,7 @@ function moveRobot(frame, joints, c, colours = []) {
 }
 
 // Compute the pose [x, y, z, w, x, y, z] of a joint in its parent node (see MovingJoint).
-function poseOf({ kind, column, axis, wxyz, turned, position }, c) {
+function jointPose({ kind, column, axis, wxyz, turned, position }, c) {
   if (kind === "free") return c.slice(column, column + 7);
   const value = c[column], cosine = Math.cos(value / 2), sine = Math.sin(value / 2);
   return kind === "slide" ? [...position.map((start, i) => start + value * axis[i]), ...wxyz]

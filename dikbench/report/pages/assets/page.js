@@ -82,7 +82,7 @@ async function play() {
     $("leading").textContent = leading(ranking);
     $("sample").value = ranking[0]?.sample ?? "";
     $("trials").hidden = !asked.picked;
-    $("trials-title").textContent = `${asked.picked} ${asked.where}: ${listed.length} trials, the worst first`;
+    $("trials-title").textContent = `${listed.length} trials of ${asked.picked}${asked.where && ` ${asked.where}`}, the worst first`;
     const address = `#${new URLSearchParams(changed)}`;
     if (changed.length || location.hash.includes("=")) history.replaceState(null, "", address);
     if (shown === asked.trial + asked.beside || !trials.has(asked.trial)) return;
