@@ -19,7 +19,7 @@ APPROXIMATE: Final = "Intervals: 95 %, closed form, paired over scenarios taken 
 
 def ranking(controls: Sequence[Control], drawn: Sequence[Mapping[str, Any]]) -> alt.Chart:
     """Tell the ranking of a view (see `ranked`), and what is said of it in sentences."""
-    limits = "limits=='broken'?', limits kept or not,':''"
+    limits = "limits=='broken'?', limits kept or not':''"
     return (
         ranked(controls, drawn)
         .transform_joinaggregate(first_place="min(place)", most_trials="max(trials)")
@@ -32,7 +32,7 @@ def ranking(controls: Sequence[Control], drawn: Sequence[Mapping[str, Any]]) -> 
             behind=_percent("difference"),
             interval=f"{_percent('lower')}+' to '+{_percent('upper')}",
             said=f"datum.contender+' ('+{_percent('rate')}+' %)'",
-            view=f"'In this view'+({limits})",
+            view=f"'Most successful in this view'+({limits})",
             relative="versus=='best'?'':'differences are to '+versus",
             intervals=f"datum.is_drawn?{json.dumps(BOOTSTRAPPED)}:{json.dumps(APPROXIMATE)}",
             sample="datum.contenders+' formulations, '+datum.most_trials+' trials each, '"

@@ -59,7 +59,7 @@ function leading(rows) {
   const named = (some) => some.slice(0, 5).map(({ said }) => said).join(", ")
     + (some.length > 5 ? ` and ${some.length - 5} more` : "");
   const others = rows[0].relative || (near.length ? `not told apart: ${named(near)}` : "all others are told apart");
-  return `${rows[0].view} ${named(best)} ${best.length > 1 ? "succeed" : "succeeds"} most often; ${others}. ${rows[0].intervals}`;
+  return `${rows[0].view}: ${named(best)}; ${others}. ${rows[0].intervals}`;
 }
 
 async function play() {
@@ -72,7 +72,7 @@ async function play() {
   const { view } = await vegaEmbed("#charts", page.specification);
   let shown = "";
   const update = async () => {
-    const asked = state(), changed = Object.entries(asked).filter(([name, value]) => value !== initial[name]);
+    const asked = state(), moved = Object.entries(asked).filter(([name, value]) => value !== initial[name]);
     for (const name in asked) view.signal(name, asked[name]);
     await view.runAsync();
     const [ranking, listed] = page.tables.map((name) => view.data(name).toSorted((a, b) => a.order - b.order));
@@ -82,9 +82,8 @@ async function play() {
     $("leading").textContent = leading(ranking);
     $("sample").value = ranking[0]?.sample ?? "";
     $("trials").hidden = !asked.picked;
-    $("trials-title").textContent = `${listed.length} trials of ${asked.picked}${asked.where && ` ${asked.where}`}, the worst first`;
-    const address = `#${new URLSearchParams(changed)}`;
-    if (changed.length || location.hash.includes("=")) history.replaceState(null, "", address);
+    $("trials-title").textContent = `The worst first: ${listed.length} trials of ${asked.picked} ${asked.where}`;
+    if (moved.length || location.hash.includes("=")) history.replaceState(null, "", `#${new URLSearchParams(moved)}`);
     if (shown === asked.trial + asked.beside || !trials.has(asked.trial)) return;
     shown = asked.trial + asked.beside;
     await opened(asked, trials, (beside) => set({ beside }));
@@ -94,7 +93,8 @@ async function play() {
     await update();
     if (heading) $(heading).focus();
   };
-  const list = (of) => set({ picked: of.contender, where: of.situation ?? "", ended: of.category ?? "" }, "trials-title");
+  const list = ({ contender: picked, situation: where = "", category: ended = "" }) =>
+    set({ picked, where, ended }, "trials-title");
   view.addEventListener("click", (_, item) => item?.datum?.contender && list(item.datum));
   $("play").addEventListener("input", ({ target }) => target.form === form && update());
   form.addEventListener("reset", () => setTimeout(update)); // once it is done
