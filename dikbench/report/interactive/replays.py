@@ -31,8 +31,8 @@ STEPS_PER_UNIT: Final = 1e4
 POSES_IN_VIEW: Final = 8
 """Configurations of each run, about, that the camera takes into view."""
 
-LONGEST_S: Final = 60.0
-"""For all runs of one formulation, which ended before: no more than a guard."""
+LONGEST_S: Final = 600.0
+"""For all runs of one robot, which ended before: no more than a guard."""
 
 
 def make_replays(trials: pd.DataFrame, rows: pd.DataFrame) -> dict[str, Any]:
@@ -48,10 +48,11 @@ def make_replays(trials: pd.DataFrame, rows: pd.DataFrame) -> dict[str, Any]:
     seconds = trials.drop_duplicates("id").set_index("id")["control_time_s"].astype(float)
     wanted = trials[trials["id"].isin(chosen_runs(rows, seconds))]
     records: list[Any] = wanted.to_dict("records")
-    of_formulation: dict[str, list[Mapping[str, Any]]] = {}
+    # In lockstep run those of one robot and reference, whatever their formulation.
+    alike: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for row in same_here(records):
-        of_formulation.setdefault(row["formulation"], []).append(row)
-    runs = _in_workers(list(of_formulation.values()))
+        alike.setdefault((row["robot"], row["reference"]), []).append(row)
+    runs = _in_workers(list(alike.values()))
     in_view: dict[tuple[str, int], list[Array]] = {}
     for row in records:
         if row["id"] in runs:
@@ -95,7 +96,7 @@ def _in_workers(groups: Sequence[list[Mapping[str, Any]]]) -> dict[str, Any]:
     count = min(available_cores(), len(groups))
     with (
         workers(count, (described_runs.__module__,)) as pool,
-        ProgressDisplay(len(groups), "formulations to be replayed") as display,
+        ProgressDisplay(len(groups), "robots to be replayed") as display,
     ):
         futures = [pool.schedule(described_runs, args=(g,), timeout=LONGEST_S) for g in groups]
         for future in futures:
