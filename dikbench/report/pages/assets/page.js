@@ -96,7 +96,7 @@ async function play() {
   const list = ({ contender: picked, situation: where = "", category: ended = "" }) =>
     set({ picked, where, ended }, "trials-title");
   view.addEventListener("click", (_, item) => item?.datum?.contender && list(item.datum));
-  $("play").addEventListener("input", ({ target }) => target.form === form && update());
+  for (const on of ["oninput", "onchange"]) $("play")[on] = ({ target }) => target.form === form && update();
   form.addEventListener("reset", () => setTimeout(update)); // once it is done
   for (const name in initial) {
     form.elements[name].value = new URLSearchParams(location.hash.slice(1)).get(name) ?? initial[name];

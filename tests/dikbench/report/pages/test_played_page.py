@@ -227,7 +227,7 @@ def test_the_first_view_has_bootstrapped_intervals(
         other = next(value for value, _ in control.options if value != control.value)
         choose(page, **{control.name: other})
         text = page.find_element("id", "leading").text
-        assert ("closed form" in text) == (control.name != "most"), control.name
+        assert ("bootstrap" in text) == (control.name == "most"), control.name
         reset(page)
 
 
