@@ -24,7 +24,7 @@ Kind = Literal["turn", "slide", "free"]
 class MovingJoint:
     """One joint as a node of a scene, whose pose in its parent node follows from coordinates c.
 
-        turn:   orientation  quaternion(axis, c) wxyz
+        turn:   orientation  quaternion(axis, c) wxyz  =  cos(c/2) wxyz + sin(c/2) turned
         slide:  position     position + c axis
         free:   position     c[0:3],   orientation  c[3:7]
 
@@ -35,6 +35,7 @@ class MovingJoint:
         column: the first of its columns in `joint_coordinates`; a free joint has 7, others one.
         axis: unit vector in the frame of the parent node, (3,); zero for a free joint.
         wxyz, position: pose in the parent node where c = 0.
+        turned: the product of the quaternions (0, axis) and wxyz, (4,).
     """
 
     node: str
@@ -43,6 +44,7 @@ class MovingJoint:
     axis: tuple[float, ...]
     wxyz: tuple[float, ...]
     position: tuple[float, ...]
+    turned: tuple[float, ...]
 
     def pose(self, row: Array) -> tuple[Array, Array]:
         """Compute position (3,) [m] and orientation w, x, y, z in the parent node.
@@ -55,9 +57,7 @@ class MovingJoint:
             return row[self.column : self.column + 3], row[self.column + 3 : self.column + 7]
         if self.kind == "slide":
             return position + c * np.array(self.axis), turn
-        w, *xyz = self.wxyz
-        turned = pin.Quaternion(pin.AngleAxis(c, np.array(self.axis))) * pin.Quaternion(w, *xyz)
-        return position, turned.coeffs()[[3, 0, 1, 2]]
+        return position, np.cos(c / 2) * turn + np.sin(c / 2) * np.array(self.turned)
 
 
 def body_node(node: str) -> str:
@@ -79,15 +79,18 @@ def moving_joints(robot: Robot, robot_node: str = ROBOT_NODE) -> list[MovingJoin
     nodes, motions = joint_nodes(model, robot_node), _motions(model)
     for number in range(1, model.njoints):
         placement = model.jointPlacements[number]
-        kind, axis = motions[number]
+        kind, own_axis = motions[number]
+        axis = placement.rotation @ own_axis
+        turned = pin.Quaternion(0.0, *axis) * pin.Quaternion(placement.rotation)
         found.append(
             MovingJoint(
                 nodes[number],
                 kind,
                 column,
-                tuple((placement.rotation @ axis).tolist()),
+                tuple(axis.tolist()),
                 wxyz(placement.rotation),
                 tuple(placement.translation.tolist()),
+                tuple(turned.coeffs()[[3, 0, 1, 2]].tolist()),
             )
         )
         column += POSE_COLUMNS if kind == "free" else 1

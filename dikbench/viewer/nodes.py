@@ -220,6 +220,12 @@ def right_of(side: Array) -> Array:
     return unit
 
 
+def points_in_view(scenario: Scenario, q: Array) -> Array:
+    """Return points (k, 3) [m] of a robot at configurations (n, nq), of its path and obstacles."""
+    points = [robot_points(scenario.robot, q), path_points(scenario), obstacle_points(scenario)]
+    return np.vstack(points)
+
+
 def camera_of(points: Array, side: Array) -> Camera:
     """Place a camera on one side (3,) of points (k, 3) [m] such that it sees them all."""
     right = right_of(side)

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from dikbench.arrays import Array
 from dikbench.robots.robot import Robot
 from dikbench.scenario.scenario import Scenario
 from dikbench.viewer.moving_joints import moving_joints
@@ -30,8 +31,8 @@ from dikbench.viewer.nodes import (
     add_robot,
     add_target,
     camera_of,
-    obstacle_points,
     path_points,
+    points_in_view,
     robot_points,
     side_of,
 )
@@ -87,8 +88,12 @@ class Surroundings:
     path: list[list[float]]
 
 
-def surroundings(scenario: Scenario) -> Surroundings:
+def surroundings(scenario: Scenario, q: Array | None = None) -> Surroundings:
     """Describe obstacles, payload, path and camera of a scenario.
+
+    Args:
+        scenario: which.
+        q: configurations (n, nq) that the camera is to see; default: the start.
 
     Raises:
         DikbenchError: if viser is missing.
@@ -98,8 +103,8 @@ def surroundings(scenario: Scenario) -> Surroundings:
         before = len(messages_of(server))
         add_obstacles(server.scene, scenario)
         add_payload(server.scene, robot)
-        points = [robot_points(robot, scenario.q0[None]), path, obstacle_points(scenario)]
-        camera_of(np.vstack(points), side_of(robot, path)).place(server)
+        seen = points_in_view(scenario, scenario.q0[None] if q is None else q)
+        camera_of(seen, side_of(robot, path)).place(server)
         messages = messages_of(server)[before:]
     return Surroundings(messages, np.round(path, 4).tolist())
 

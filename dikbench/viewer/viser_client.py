@@ -20,14 +20,25 @@ INSTALL: Final = "a replay needs viser: pip install 'dikbench[replay]'"
 
 HOST: Final = "127.0.0.1"
 
+_GIVEN: Final = (
+    '<script nonce="@@nonce@@">window.__VISER_EMBED_DATA__="@@data@@";'
+    "window.__VISER_EMBED_CONFIG__={darkMode:@@dark@@};</script>"
+    # It warns of slow graphics, and would show a list of nodes.
+    '<style>[class*=Notification],[aria-label="Show scene tree"]{display:none!important}</style>'
+)
+
 
 def has_viser() -> bool:
     """Whether viser is installed."""
     return find_spec("viser") is not None
 
 
-def client_html() -> str:
+def client_template() -> str:
     """Read the client of the installed viser: one HTML page of 0.8 MB that needs nothing else.
+
+    In it stand `@@data@@` for a scene (see `StaticScene`), `@@dark@@` for whether it is dark (true
+    or false), and `@@nonce@@` for that of the scripts of the page in whose frame it is put: such a
+    page lets no others through, neither the client's own nor those that it adds.
 
     Raises:
         DikbenchError: if viser is missing.
@@ -36,7 +47,9 @@ def client_html() -> str:
     if spec is None or spec.origin is None:
         raise DikbenchError(INSTALL)
     file = Path(spec.origin).parent / "client" / "build" / "index.html"
-    return file.read_text(encoding="utf-8")
+    client = file.read_text(encoding="utf-8").replace("<script ", '<script nonce="@@nonce@@" ')
+    client = client.replace('("script");e.', '("script");e.nonce="@@nonce@@";e.')
+    return client.replace("<head>", f"<head>{_GIVEN}", 1)
 
 
 @contextmanager

@@ -176,13 +176,14 @@ def opened_trial(page: Any) -> str:
     trial = page.execute_script(
         """
         const row = Array.from(document.querySelectorAll("#trials tbody tr"))
-          .find((row) => row.cells[8].textContent);
+          .find((row) => row.cells[1].textContent);
         row.querySelector("button").click();
         return row.querySelector("button").textContent;
         """
     )
     wait(
         page,
-        "return !document.getElementById('run').hidden && document.getElementById('clock').value",
+        "return document.getElementById('run').className === 'carried'"
+        " && document.getElementById('clock').value",
     )
     return str(trial)

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import altair as alt
 
-from dikbench.report.interactive.controls import Control, filter_of
+from dikbench.report.interactive.controls import Control, filter_of, is_at_first
 from dikbench.report.interactive.page_rows import TOLERANCES_M
 from dikbench.report.selection.categories import CATEGORIES
 from dikbench.statistics.first_places import FEWEST_SCENARIOS
@@ -21,6 +21,9 @@ DEVIATIONS: Final = 1.96
 
 GOOD: Final = "#0B7A75"
 OTHER: Final = "#8a8f98"
+TIED: Final = "#17978F"
+"""`GOOD`, seen on a dark ground as well where it is thin or pale."""
+
 CHOSEN: Final = "#B4468F"
 BAD: Final = "#C8502B"
 
@@ -94,14 +97,23 @@ def comparable(rows: alt.Chart) -> alt.Chart:
     return weighted(rows).transform_filter("datum.whole==1")
 
 
-def ranked(controls: Sequence[Control]) -> alt.Chart:
+def ranked(controls: Sequence[Control], drawn: Sequence[Mapping[str, Any]]) -> alt.Chart:
     """Rank the laws by success, each compared with the best or with the law of `versus`.
 
     A row per law: rate, trials, whole (whether it ran every case), difference, lower, upper (the
-    paired interval: of independent scenarios), tied (not told apart from whom it is compared with),
-    place. Who did not run every case has no place, nor has anybody where fewer than
-    `FEWEST_SCENARIOS` scenarios count.
+    paired interval: drawn in the first view, else of independent scenarios), tied (not told apart
+    from whom it is compared with), place. Who did not run every case has no place, nor has anybody
+    where fewer than `FEWEST_SCENARIOS` scenarios count.
+
+    Args:
+        controls: of the rows.
+        drawn: the intervals of the first view (see `default_intervals`).
     """
+    intervals = alt.LookupData(
+        alt.InlineData(list(drawn) or [{"contender": ""}]),
+        key="contender",
+        fields=["drawn_lower", "drawn_upper"],
+    )
     return (
         weighted(counted_rows(controls))
         .transform_aggregate(
@@ -134,11 +146,15 @@ def ranked(controls: Sequence[Control]) -> alt.Chart:
             groupby=["contender"],
         )
         .transform_calculate(half=f"{DEVIATIONS}*sqrt(datum.variance)")
+        .transform_lookup(lookup="contender", from_=intervals)
+        .transform_calculate(is_drawn=f"({is_at_first(controls)})&&isValid(datum.drawn_lower)")
         .transform_calculate(
-            lower="max(-1,datum.difference-datum.half)",
-            upper="min(1,datum.difference+datum.half)",
-            low="max(0,datum.rate-datum.half)",
-            high="min(1,datum.rate+datum.half)",
+            lower="datum.is_drawn?datum.drawn_lower:max(-1,datum.difference-datum.half)",
+            upper="datum.is_drawn?datum.drawn_upper:min(1,datum.difference+datum.half)",
+        )
+        .transform_calculate(
+            low="max(0,datum.rate+datum.lower-datum.difference)",
+            high="min(1,datum.rate+datum.upper-datum.difference)",
             enough=f"datum.count>={FEWEST_SCENARIOS}?1:0",
             rounded="datum.whole*1e7+round(1e6*datum.rate)",
         )
@@ -158,15 +174,17 @@ def ranked(controls: Sequence[Control]) -> alt.Chart:
     )  # fmt: skip
 
 
-def matrix(controls: Sequence[Control], situations: Sequence[str]) -> Any:
-    """Draw laws over situations: a bar of outcomes each, sorted by success."""
+def matrix(
+    controls: Sequence[Control], drawn: Sequence[Mapping[str, Any]], situations: Sequence[str]
+) -> Any:
+    """Draw laws over situations: a bar of outcomes each, sorted by success (see `ranked`)."""
     by_success = alt.EncodingSortField(field="sorted", op="max", order="descending")
     lines = alt.Axis(ticks=False, domain=False, labelFontSize=12, labelLimit=230, minExtent=175,
                      labelPadding=6, title=None)  # fmt: skip
     scale = alt.Scale(domain=[0, 1.42], nice=False)
-    rates = ranked(controls).transform_calculate(sorted="datum.rounded", zero="0")
+    rates = ranked(controls, drawn).transform_calculate(sorted="datum.rounded", zero="0")
     y = alt.Y("contender:N", axis=lines, sort=by_success)
-    colour = alt.condition("datum.tied==1", alt.value(GOOD), alt.value(OTHER))
+    colour = alt.condition("datum.tied==1", alt.value(TIED), alt.value(OTHER))
     tooltip = [
         NAMED,
         alt.Tooltip("rate:Q", format=".1%", title="success"),
@@ -179,7 +197,7 @@ def matrix(controls: Sequence[Control], situations: Sequence[str]) -> Any:
     ]
     overall = alt.layer(
         _heading([("Overall", 0.0)], scale),
-        rates.mark_rule(strokeWidth=9, opacity=0.28).encode(
+        rates.mark_rule(strokeWidth=9, opacity=0.35).encode(
             alt.X("zero:Q", scale=scale, axis=None), alt.X2("rate:Q"), y=y, color=colour
         ),
         rates.mark_rule(strokeWidth=2, opacity=0.8).encode(

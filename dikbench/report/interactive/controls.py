@@ -6,15 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-import altair as alt
 import pandas as pd
 
-from dikbench.report.interactive.page_rows import TOLERANCES_M
+from dikbench.report.interactive.page_rows import AT_REST, BOTH, TOLERANCES_M
 from dikbench.report.selection.judged import DEFINITIONS, IN_WORDS
 
 ANY: Final = "any"
 ANY_OF: Final[tuple[tuple[str, ...], ...]] = ((), (ANY,))
 """What stands beside the values of a list: nothing where there is one, else any of them."""
+
+MARKS: Final = ("picked", "where", "ended", "trial", "beside")
+"""What marks that were clicked choose: a formulation, a situation and an outcome, whose trials are
+listed; a trial, and another one beside it. They are in the address too."""
 
 ONE_EACH: Final = "one each"
 PERIODS_US: Final = {"100 Hz": 10000, "200 Hz": 5000, "500 Hz": 2000, "1 kHz": 1000, "2 kHz": 500,
@@ -27,7 +30,7 @@ class Control:
     """A question to the reader, answered by a list or a slider.
 
     Attributes:
-        name: of its parameter in the charts, its element in the page and its key in the address.
+        name: of its signal in the charts, its element in the page and its key in the address.
         label: what stands before it.
         options: the values and their texts; those of a slider are its places.
         value: at first.
@@ -41,12 +44,6 @@ class Control:
     value: str
     test: str = ""
     slider: bool = False
-
-    @property
-    def parameter(self) -> alt.Parameter:
-        """The parameter of the charts that is bound to it."""
-        bound = alt.BindDirect(element=f"#{self.name}")
-        return alt.param(self.name, value=self.value, bind=bound)
 
 
 def controls(rows: pd.DataFrame) -> list[Control]:
@@ -90,6 +87,24 @@ def controls(rows: pd.DataFrame) -> list[Control]:
         _list("most", "Show", [("16", "the first 16"), ("999", "all")]),
     ]  # fmt: skip
     return [each for each in found if len(each.options) > 1]
+
+
+def rows_at_first(rows: pd.DataFrame, every: Sequence[Control]) -> pd.DataFrame:
+    """Return the rows that the controls leave before any of them was moved."""
+    values = {each.name: each.value for each in every}
+    found = rows[rows["first"].eq(1)] if values.get("solver") == ONE_EACH else rows
+    for name in ("reference", "plant", "variant"):
+        if values.get(name, ANY) != ANY:
+            found = found[found[name].isin([values[name], AT_REST, BOTH])]
+    return found
+
+
+def is_at_first(every: Sequence[Control]) -> str:
+    """Return the expression that is true where `rows_at_first` are left, each told from the best.
+
+    How many are shown changes nothing.
+    """
+    return "&&".join(f"{each.name}=='{each.value}'" for each in every if each.name != "most")
 
 
 def phase_controls(rows: pd.DataFrame) -> list[Control]:

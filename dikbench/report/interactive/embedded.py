@@ -15,8 +15,6 @@ from dikbench.report.interactive.page_rows import as_columns, page_rows
 from dikbench.report.interactive.replays import make_replays
 from dikbench.report.interactive.specification import Charts, bundle, make_charts
 from dikbench.report.interactive.trace_charts import trace_charts
-from dikbench.report.selection.categories import CATEGORIES
-from dikbench.statistics.first_places import FEWEST_SCENARIOS
 from dikbench.viewer.legend import COLOURS, TARGET_COLOUR
 
 
@@ -43,17 +41,13 @@ def embed(trials: pd.DataFrame) -> Embedded | None:
     if rows.empty:
         return None
     charts, replays = make_charts(rows), make_replays(trials, rows)
+    carried = rows["id"].isin(replays["runs"].keys()).astype(int)
     data = {
         "specification": charts.specification,
         "rows": ROWS,
-        "columns": packed(as_columns(rows)),
-        "controls": [each.name for each in charts.controls],
-        "phase": [each.name for each in charts.phase],
-        "ranking": charts.ranking,
-        "trials": charts.trials,
-        "outcomes": [each.name for each in CATEGORIES],
-        "fewest": f"Nobody is ranked in this view: fewer than {FEWEST_SCENARIOS} scenarios.",
-        "runs": dict.fromkeys(replays["runs"], 1),
+        "columns": packed(as_columns(rows.assign(carried=carried))),
+        "tolerances": [text for _, text in charts.controls[0].options],
+        "tables": [charts.ranking, charts.trials],
         "replays": packed(replays),
         "traces": trace_charts(),
         "colours": list(COLOURS.values()),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from shlex import quote
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -30,6 +31,9 @@ TOLERANCES_M: Final = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05)
 AT_REST: Final = "rest"
 """The reference of a target at rest, which neither waits nor moves on."""
 
+BOTH: Final = "both"
+"""The variant of what has nothing to tune, or whose defaults tuning did not better."""
+
 SHOWN: Final[Mapping[str, tuple[str, float]]] = MappingProxyType(
     {
         "error": ("contour_error_6d_rms_m", 1e3),
@@ -45,11 +49,11 @@ def page_rows(trials: pd.DataFrame) -> pd.DataFrame:
     """Make the rows of the page: a trial that counts in a setting each (see `counted`).
 
     Its columns are id, contender (the formulation, with its solver where it has several),
-    formulation, solver, interface, first (1 for the first solver of a formulation), variant and
-    is_tuned (see `variant`), scenario, seed, family, situation, plant, reference (`AT_REST` where
-    the target rests), robot, outcomes (see `_outcomes`), the numbers of `SHOWN`, deadline (see
-    `_slowest_steps` [us]), grid, across, up (its place in a phase diagram), swept, value (the
-    parameter of the formulation that is swept).
+    formulation, solver, asked_law and asked_case (the options of `dikbench run`), interface, first
+    (1 for the first solver of a formulation), variant and is_tuned (see `variant`), scenario, seed,
+    family, situation, plant, reference (`AT_REST` where the target rests), robot, outcomes (see
+    `_outcomes`), the numbers of `SHOWN`, deadline (see `_slowest_steps` [us]), grid, across, up
+    (its place in a phase diagram), swept, value (the parameter of the formulation that is swept).
     """
     facts = with_facts(trials)
     facts = facts[~facts["formulation"].isin(ORACLES)]
@@ -68,6 +72,14 @@ def page_rows(trials: pd.DataFrame) -> pd.DataFrame:
             "contender": [names[pair] for pair in pairs],
             "formulation": rows["formulation"],
             "solver": rows["solver"],
+            "asked_law": [_options(formulation=f, solver=s) for f, s in pairs],
+            "asked_case": [
+                _options(scenario=scenario, seed=seed, plant=plant, reference=reference)
+                for scenario, seed, plant, reference in zip(
+                    *(rows[name] for name in ("scenario", "seed", "plant", "reference")),
+                    strict=True,
+                )
+            ],
             "interface": [interface_of(solver) for solver in rows["solver"]],
             "first": rows["solver"].eq(first).astype(int),
             "variant": rows["formulation"].map(variants),
@@ -86,9 +98,15 @@ def page_rows(trials: pd.DataFrame) -> pd.DataFrame:
             },
         }
     )
-    found["is_tuned"] = found["variant"].isin(["tuned", "both"]).astype(int)
+    found["is_tuned"] = found["variant"].isin(["tuned", BOTH]).astype(int)
     found["deadline"] = _slowest_steps(trials).reindex(pairs).to_numpy()
     return found.join(_grid_places(rows)).join(_swept(rows))
+
+
+def _options(**values: Any) -> str:
+    """Write options of a command for a shell, those without a value left out."""
+    told = [f"--{name} {quote(str(value))}" for name, value in values.items() if value != "none"]
+    return " ".join(told)
 
 
 def interface_of(solver: str) -> str:
@@ -122,7 +140,7 @@ def variant(formulation: str) -> str:
     except DikbenchError:
         return untold
     if not tunable or own == default == best:
-        return "both"
+        return BOTH
     return "tuned" if own == best else "default" if own == default else "other"
 
 

@@ -14,6 +14,7 @@ from dikbench.report.interactive.charts import (
     GOOD,
     NAMED,
     OTHER,
+    TIED,
     category_at,
     comparable,
     counted_rows,
@@ -21,7 +22,7 @@ from dikbench.report.interactive.charts import (
 from dikbench.report.interactive.controls import Control
 from dikbench.report.interactive.page_rows import TOLERANCES_M
 
-WIDTH_PX: Final = 340
+WIDTH_PX: Final = 310
 HEIGHT_PX: Final = 240
 
 _CASE: Final[list[Any]] = ["scenario", "seed", "plant", "reference"]
@@ -32,7 +33,7 @@ LEAST_RATE: Final = 0.3
 
 def _colours() -> Any:
     """Colour the law that the others are relative to."""
-    return alt.condition("datum.contender==versus", alt.value(CHOSEN), alt.value(GOOD))
+    return alt.condition("datum.contender==versus", alt.value(CHOSEN), alt.value(TIED))
 
 
 def cost(controls: Sequence[Control]) -> Any:
@@ -190,8 +191,13 @@ def phase(controls: Sequence[Control], across: str, up: str) -> Any:
     )
 
 
-def sensitivity(controls: Sequence[Control]) -> Any:
-    """Draw success against the parameter of a formulation, whatever `variant` chooses."""
+def sensitivity(controls: Sequence[Control], parameter: str) -> Any:
+    """Draw success against the parameter of a formulation, whatever `variant` chooses.
+
+    Args:
+        controls: of the rows.
+        parameter: what it is called.
+    """
     free = [each for each in controls if each.name != "variant"]
     found = (
         comparable(counted_rows(free).transform_filter("datum.swept!=''"))
@@ -200,14 +206,14 @@ def sensitivity(controls: Sequence[Control]) -> Any:
             groupby=["contender", "swept", "value"],
         )
     )  # fmt: skip
-    x = alt.X("value:Q", title="parameter", scale=alt.Scale(type="log", nice=False, padding=14))
+    x = alt.X("value:Q", title=parameter, scale=alt.Scale(type="log", nice=False, padding=14))
     y = alt.Y("rate:Q", title="success", scale=alt.Scale(domain=[0, 1]))
     tooltip = [NAMED, alt.Tooltip("rate:Q", format=".1%", title="success"),
                alt.Tooltip("n:Q", title="trials")]  # fmt: skip
-    lines = found.mark_line(color=GOOD).encode(x, y, detail="swept:N")
+    lines = found.mark_line(color=TIED).encode(x, y, detail="swept:N")
     points = found.mark_circle(size=60, cursor="pointer", opacity=1).encode(
         x, y, tooltip=tooltip,
-        color=alt.condition("datum.tuned==1", alt.value(CHOSEN), alt.value(GOOD)),
+        color=alt.condition("datum.tuned==1", alt.value(CHOSEN), alt.value(TIED)),
     )  # fmt: skip
     return alt.layer(lines, points).properties(
         width=WIDTH_PX, height=HEIGHT_PX, title="Sensitivity to a parameter", name="sensitivity"

@@ -11,13 +11,18 @@ import altair as alt
 import pandas as pd
 import vl_convert
 
-from dikbench.report.interactive.charts import ROWS, counted_rows, matrix, ranked
-from dikbench.report.interactive.controls import Control, controls, phase_controls
+from dikbench.report.interactive.charts import ROWS, matrix
+from dikbench.report.interactive.controls import MARKS, Control, controls, phase_controls
+from dikbench.report.interactive.default_intervals import default_intervals
 from dikbench.report.interactive.pictures import cost, deadline, phase, profile, sensitivity
+from dikbench.report.interactive.tables import listed_trials, ranking
 from dikbench.report.selection.judged import DEFINITIONS
 
 VEGA_LITE: Final = "6.4"
 """The version of Vega-Lite whose bundle is in the page."""
+
+EMBEDDING: Final[dict[str, Any]] = {"embedOptions": {"renderer": "svg", "actions": False}}
+"""How the page shows the charts: their marks can be read, and there is no menu beside them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,18 +57,16 @@ def make_charts(rows: pd.DataFrame) -> Charts:
         up, _, across = named.partition(" over ")
         pictures.append(phase(asked, across, up))
     if rows["swept"].ne("").any():
-        pictures.append(sensitivity(asked))
+        swept = sorted(set(rows["swept"]) - {""})
+        pictures.append(sensitivity(asked, swept[0] if len(swept) == 1 else "a parameter"))
+    drawn = default_intervals(rows, asked)
     tables = [
-        ranked(asked).mark_text(fontSize=0).encode(text="contender:N").properties(
-            width=1, height=1, name="ranking"
-        ),
-        counted_rows(asked).transform_filter("datum.contender==picked").mark_text(fontSize=0).encode(
-            text="id:N"
-        ).properties(width=1, height=1, name="trials"),
-    ]  # fmt: skip
+        table.mark_text(fontSize=0).encode(text="order:Q").properties(width=1, height=1, name=name)
+        for name, table in (("ranking", ranking(asked, drawn)), ("trials", listed_trials(asked)))
+    ]
     chart = (
         alt.vconcat(
-            matrix(asked, situations),
+            matrix(asked, drawn, situations),
             alt.concat(*pictures, columns=3, spacing=40).resolve_scale(
                 color="independent", size="independent"
             ),
@@ -72,12 +75,13 @@ def make_charts(rows: pd.DataFrame) -> Charts:
         )
         .resolve_scale(color="independent")
         .add_params(
-            *(each.parameter for each in (*asked, *of_phase)), alt.param("picked", value="")
+            *(alt.param(each.name, value=each.value) for each in (*asked, *of_phase)),
+            *(alt.param(name, value="") for name in MARKS),
         )
         .configure(background="transparent", padding=0)
         .configure_view(stroke=None)
         .configure_axis(
-            labelColor="currentColor", titleColor="currentColor", gridOpacity=0.35,
+            labelColor="currentColor", titleColor="currentColor", gridColor="#8884",
             domainColor="#8888", tickColor="#8888", labelFontSize=11, titleFontSize=12,
             titleFontWeight="normal",
         )
@@ -86,6 +90,7 @@ def make_charts(rows: pd.DataFrame) -> Charts:
     )  # fmt: skip
     lite = json.loads(chart.to_json(indent=None))
     lite["datasets"] = {**lite.get("datasets", {}), ROWS: []}
+    lite["usermeta"] = EMBEDDING
     vega = vl_convert.vegalite_to_vega(lite, vl_version=VEGA_LITE)
     return Charts(vega, asked, of_phase, _data_of(vega, "ranking"), _data_of(vega, "trials"))
 

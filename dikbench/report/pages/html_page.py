@@ -18,6 +18,7 @@ from markupsafe import Markup
 from dikbench.report.contents.contents import Contents
 from dikbench.report.drawing.figure import Figure
 from dikbench.report.interactive.chosen_runs import RULE
+from dikbench.report.interactive.controls import MARKS
 from dikbench.report.interactive.embedded import Embedded
 from dikbench.report.pages.backticks import to_html
 from dikbench.report.tables.table import Column, TableCell, shown
@@ -109,6 +110,7 @@ def render_html(contents: Contents, figures: Path, embedded: Embedded | None) ->
         "assets": _assets(),
         "charts": None if embedded is None else embedded.charts,
         "rule": RULE,
+        "marks": MARKS,
         "page_data": Markup("" if embedded is None else embedded.data),
         "bundle": Markup("" if embedded is None else embedded.bundle),
     }

@@ -164,6 +164,14 @@ class Table:
         return tuple(place for place, column in enumerate(self.columns) if column.shown)
 
     @property
+    def counts_first(self) -> tuple[int, ...]:
+        """The same, numbers of trials first: they stay where there is room for few columns."""
+        return tuple(sorted(self.shown, key=lambda place: not self._is_sample(place)))
+
+    def _is_sample(self, place: int) -> bool:
+        return self.columns[place].key in {"trials", "runs", "scenarios"}
+
+    @property
     def overall(self) -> tuple[Block, ...]:
         """The blocks over all families."""
         return tuple(block for block in self.blocks if block.family == ALL)

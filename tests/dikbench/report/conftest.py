@@ -75,7 +75,7 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
 @pytest.fixture
 def page(browser: Any, played: Path) -> Any:
     """The page with its controls as at first, left open by another test where it was."""
-    if browser.current_url.startswith("file") and "trial" not in browser.current_url:
+    if browser.current_url.startswith("file") and "picked" not in browser.current_url:
         reset(browser)
         return browser
     return at(browser, played)

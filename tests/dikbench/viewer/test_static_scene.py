@@ -20,7 +20,7 @@ from dikbench.robots.robot import Robot, model_limits
 from dikbench.viewer.moving_joints import joint_coordinates, joint_nodes, moving_joints
 from dikbench.viewer.nodes import PATH_POINTS, tool_node
 from dikbench.viewer.static_scene import replay_script, static_scene, surroundings
-from dikbench.viewer.viser_client import client_html
+from dikbench.viewer.viser_client import client_template
 
 pytest.importorskip("viser", reason="viser is not installed: pip install 'dikbench[replay]'")
 pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
@@ -104,7 +104,7 @@ def page(robot: Robot, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any
     (folder / "page.html").write_text(
         PAGE.format(
             script=replay_script(),
-            client=json.dumps(client_html()).replace("</", "<\\/").replace("<!--", "<\\!--"),
+            client=json.dumps(client_template()).replace("</", "<\\/").replace("<!--", "<\\!--"),
             scene=json.dumps({"data": scene.data, "joints": scene.joints}),
         ),
         encoding="utf-8",

@@ -3,6 +3,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field, replace
 from html.parser import HTMLParser
+from importlib import resources
 from itertools import pairwise
 from pathlib import Path
 
@@ -170,7 +171,9 @@ def test_every_figure_is_within_and_described(report: Path) -> None:
 def test_the_best_is_marked_and_unstable_times_are_greyed(report: Path) -> None:
     """Stars stand at who may be first, alone in the table of success; a tilde at drifting times."""
     text = (report / "report.html").read_text(encoding="utf-8")
-    rows = re.findall(r'<tr><th scope="row" class="name">(.*?)</th>(.*?)</tr>', text)
+    rows = re.findall(
+        r'<tr data-names="[^"]*"><th scope="row" class="name">(.*?)</th>(.*?)</tr>', text
+    )
     starred = {name for name, cells in rows if "class=best" in cells.replace('"', "")}
     assert starred == {"qp", "dls[damping=0.1]"}
     unstable = {name for name, cells in rows if "unstable" in cells}
@@ -178,7 +181,7 @@ def test_the_best_is_marked_and_unstable_times_are_greyed(report: Path) -> None:
 
 
 def test_success_stands_first(report: Path) -> None:
-    """In both pages, outcomes next; then the tables of all runs, and the solvers."""
+    """Outcomes next; then the tables of all runs, and the solvers."""
     titles = (
         "Success: ",
         "Outcomes: ",
@@ -187,10 +190,47 @@ def test_success_stands_first(report: Path) -> None:
         "Timing",
         "Solvers",
     )
-    for file, mark in (("report.html", "<h3>"), ("report.md", "## ")):
-        text = (report / file).read_text(encoding="utf-8")
-        places = [text.index(mark + title) for title in titles]
-        assert places == sorted(places)
+    text = (report / "report.html").read_text(encoding="utf-8")
+    places = [text.index("<h3>" + title) for title in titles]
+    assert places == sorted(places)
+
+
+def test_columns_beyond_eight_are_behind_more(report: Path) -> None:
+    """A table has a box for them if it has them, and a row of names for the filter."""
+    text = (report / "report.html").read_text(encoding="utf-8")
+    tables = re.findall(r'(<label class="more">.*?</label>\s*)?(<table class="sortable.*?</table>)',
+                        text, re.DOTALL)  # fmt: skip
+    counts = [
+        (bool(box), table.count('<th scope="col"')) for box, table in tables if "title=" in table
+    ]
+    assert {has for has, _ in counts} == {True, False}
+    for has_box, count in counts:
+        assert has_box == (count > 8)
+
+
+def test_own_script_is_glue() -> None:
+    """At most 200 lines of code: what is more belongs to a library, or to Python."""
+    report, viewer = resources.files("dikbench.report.pages"), resources.files("dikbench.viewer")
+    files = report / "assets" / "page.js", viewer / "assets" / "replay.js"
+    lines = [line.strip() for file in files for line in file.read_text("utf-8").splitlines()]
+    code = [line for line in lines if line and not line.startswith("//")]
+    assert len(code) <= 200
+    assert max(map(len, code)) <= 120
+
+
+def test_the_short_page_has_a_matrix_and_the_tables_that_fit(report: Path) -> None:
+    """The best first, who did not run every trial last; of larger tables only where they are."""
+    text = (report / "report.md").read_text(encoding="utf-8")
+    matrix = text.partition("## Success by situation")[2].partition("\n## ")[0]
+    rows = [line.split("|")[1:-1] for line in matrix.splitlines() if line.startswith("|")][2:]
+    trials = [int(row[-1]) for row in rows]
+    rates = [float(row[-2]) for row in rows if int(row[-1]) == max(trials)]
+    assert len(rates) > 1
+    assert rates == sorted(rates, reverse=True)
+    assert trials[: len(rates)] == [max(trials)] * len(rates)
+    assert "## Outcomes" not in text
+    assert "(tables/outcomes.md)" in text
+    assert len(text.splitlines()) < 200
 
 
 def test_families_and_laws_are_described(report: Path) -> None:

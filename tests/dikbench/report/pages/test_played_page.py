@@ -14,6 +14,7 @@ from makers.played import choose, chosen, expected, reset, shown_marks, shown_ra
 from dikbench.report.interactive.controls import controls
 from dikbench.report.interactive.page_rows import TOLERANCES_M
 from dikbench.report.selection.categories import CATEGORIES
+from dikbench.statistics.success import rates, succeeded, with_facts
 
 pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
 pytestmark = pytest.mark.skipif(
@@ -196,6 +197,38 @@ def test_intervals_are_those_of_paired_differences(
             assert apart == ("no" if low <= 0 <= high and rate[name] > 0 else "yes"), name
         else:
             assert (place, apart) == ("", ""), name
+
+
+def test_the_first_view_has_bootstrapped_intervals(
+    page: Any, trials: pd.DataFrame, rows: pd.DataFrame
+) -> None:
+    """They are those of `statistics.success` for the same trials; every control takes them away."""
+    found = chosen(rows)
+    facts = with_facts(trials).set_index("id").loc[found["id"]].reset_index()
+    success = rates(facts, succeeded(facts))
+    names = found.drop_duplicates(["formulation", "solver"]).set_index(["formulation", "solver"])
+    want = {
+        names["contender"][pair]: [100 * low, 100 * high]
+        for pair, low, high in zip(
+            success.contenders.itertuples(index=False, name=None),
+            success.lower, success.upper, strict=True,
+        )
+    }  # fmt: skip
+    said = page.execute_script(
+        "return Array.from(document.querySelectorAll('#ranking tbody tr'),"
+        " (row) => [row.cells[1].textContent, row.cells[4].textContent])"
+    )
+    assert {name for name, _ in said} == want.keys()
+    for name, interval in said:
+        told = [float(each) for each in interval.split(" to ")]
+        assert told == pytest.approx(want[name], abs=0.0501), name
+    assert "bootstrap" in page.find_element("id", "leading").text
+    for control in controls(rows):
+        other = next(value for value, _ in control.options if value != control.value)
+        choose(page, **{control.name: other})
+        text = page.find_element("id", "leading").text
+        assert ("bootstrap" in text) == (control.name == "most"), control.name
+        reset(page)
 
 
 def test_success_over_tolerances_is_that_of_the_rows(page: Any, rows: pd.DataFrame) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from shlex import quote
 from typing import Any, Final
 
 import numpy as np
@@ -54,7 +55,7 @@ def test_a_bar_leads_to_its_trials_and_a_trial_to_its_run(
     assert row["scenario"] in title
     assert row["contender"] in title
     assert f"dikbench replay {trial}" in commands
-    assert f"--formulation '{row['formulation']}'" in commands
+    assert f"--formulation {quote(row['formulation'])}" in commands
     assert f"trial={trial}" in page.current_url
     recording = find_recording(trial, played)
     told = page.execute_script("return document.getElementById('run-certificate').textContent")
@@ -84,7 +85,7 @@ def moves_as_the_trace_says(page: Any, recording: Recording) -> None:
 
 TOOL_AT: Final = """
 const [share, done] = arguments, slider = document.getElementById("instant");
-slider.value = share;
+slider.value = share * slider.max;
 slider.dispatchEvent(new Event("input"));
 setTimeout(() => {
   const viser = document.querySelector("#replays iframe").contentWindow.__viserMutable;
@@ -111,7 +112,75 @@ def test_a_link_restores_a_trial_beside_another(browser: Any, played: Path) -> N
     )
     wait(page, f"return location.hash.includes('beside={beside}')")
     again = at(browser, played, trial=trial, beside=beside, tolerance="2")
-    wait(again, "return !document.getElementById('run').hidden")
+    wait(again, "return document.getElementById('run').className === 'carried'")
     wait(again, "return document.querySelectorAll('#replays > div:not([hidden])').length == 2")
     assert again.execute_script("return document.getElementById('beside').value") == beside
     assert again.execute_script("return document.getElementById('tolerance').value") == "2"
+
+
+def tab_to(page: Any, wanted: str, most: int = 60) -> list[str]:
+    """Press Tab until an element that a selector finds has the focus; the ids passed by."""
+    from selenium.webdriver.common.keys import Keys
+
+    passed: list[str] = []
+    for _ in range(most):
+        page.switch_to.active_element.send_keys(Keys.TAB)
+        if page.execute_script("return document.activeElement.matches(arguments[0])", wanted):
+            return passed
+        passed.append(page.execute_script("return document.activeElement.id"))
+    raise AssertionError(f"{wanted} is not reached: {passed}")
+
+
+def test_all_of_it_is_done_by_keyboard(browser: Any, played: Path) -> None:
+    """Controls, a formulation of the ranking, a trial, another beside it, time; no frame traps."""
+    from selenium.webdriver.common.keys import Keys
+
+    page = at(browser, played)
+    page.execute_script("document.getElementById('play-title').tabIndex = -1")
+    page.execute_script("document.getElementById('play-title').focus()")
+    controls = page.execute_script(
+        "return Array.from(document.querySelectorAll('#controls :is(input, select):not([type="
+        "hidden])'), (each) => each.id)"
+    )
+    assert page.execute_script("return document.activeElement.id") == "play-title"
+    assert tab_to(page, "#reset") == controls
+    page.execute_script("document.getElementById('tolerance').focus()")
+    page.switch_to.active_element.send_keys(Keys.RIGHT)
+    wait(page, "return location.hash.includes('tolerance=1')")
+    assert page.execute_script("return document.getElementById('tolerance').ariaValueText")
+    tab_to(page, "#reset")
+    page.switch_to.active_element.send_keys(Keys.ENTER)
+    wait(page, "return location.hash.length < 2")
+    tab_to(page, "#ranking tbody button")
+    name = page.switch_to.active_element.text
+    page.switch_to.active_element.send_keys(Keys.ENTER)
+    wait(page, "return document.activeElement.id === 'trials-title'")
+    assert f"trials of {name}" in page.switch_to.active_element.text
+    tab_to(page, "#all-trials")
+    page.switch_to.active_element.send_keys(Keys.SPACE)
+    # The first that is carried, whatever comes before it.
+    carried = page.execute_script(
+        "return Array.from(document.querySelectorAll('#trials-table tbody tr'))"
+        ".findIndex((row) => row.cells[1].textContent) + 1"
+    )
+    tab_to(page, f"#trials-table tbody tr:nth-child({carried}) button")
+    page.switch_to.active_element.send_keys(Keys.ENTER)
+    wait(page, "return document.activeElement.id === 'run-title'")
+    wait(page, "return document.getElementById('clock').value")
+    tab_to(page, "#beside")
+    page.switch_to.active_element.send_keys(Keys.DOWN)
+    wait(page, "return location.hash.includes('beside=')")
+    wait(page, "return document.querySelectorAll('#replays > div:not([hidden])').length == 2")
+    if has_viser():
+        frames = "document.querySelectorAll('#replays iframe')"
+        wait(page, f"return {frames}.length == 2")
+    assert tab_to(page, "#instant") == ["go"]  # no frame is between them
+    page.switch_to.active_element.send_keys(Keys.HOME)
+    assert page.execute_script("return document.getElementById('clock').value") == "0.00 s"
+    page.switch_to.active_element.send_keys(Keys.RIGHT)
+    assert page.execute_script("return Number(document.getElementById('instant').value)") > 0
+    page.execute_script("document.getElementById('go').focus()")
+    page.switch_to.active_element.send_keys(Keys.SPACE)
+    end = "document.getElementById('instant').max"
+    wait(page, f"return Number(document.getElementById('instant').value) >= 0.99 * {end}")
+    wait(page, "return !document.getElementById('go').checked")
