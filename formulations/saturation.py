@@ -165,9 +165,7 @@ def _hold(bounds: dict[int, float], start: Array, N: Array) -> _Held | None:
     return _Held(start + effect @ gap, N - effect @ rows, effect)
 
 
-def fitting_scale(
-    a: Array, b: Array, box: Box, bounds: Iterable[int]
-) -> tuple[float, int | None]:
+def fitting_scale(a: Array, b: Array, box: Box, bounds: Iterable[int]) -> tuple[float, int | None]:
     """Compute the largest scale s <= 1 with a s + b in the box, and the joint to hold next.
 
     The scale is -1 where no scale s >= 0 fits. The joint is, among those outside at s = 1, the one

@@ -81,8 +81,10 @@ class FastSaturationInNullSpace(Parameters):
             scale, critical = fitting_scale(a, b, box, held)
             if scale > best_scale:
                 best, best_scale = (inside(b + scale * a, box), Z), scale
-            if critical is None or len(rows) < len(J) or Z[critical, critical] <= (
-                SMALLEST_SQUARED_FREEDOM
+            if (
+                critical is None
+                or len(rows) < len(J)
+                or Z[critical, critical] <= (SMALLEST_SQUARED_FREEDOM)
             ):
                 return best
             bound = (box.upper if a[critical] + b[critical] > box.upper[critical] else box.lower)[
