@@ -30,7 +30,7 @@ quick:           ## the default study
 
 benchmark:       ## how fast the harness is, against its peers (let nothing else run)
 	$(PYTHON) -m pip install --quiet -e ".[peers,drake]" && $(PYTHON) tests/benchmarks/ratios.py \
-	  && $(PYTHON) tests/benchmarks/lockstep.py
+	  && $(PYTHON) tests/benchmarks/peer_ratios.py && $(PYTHON) tests/benchmarks/lockstep.py
 
 benchmark-scenarios:  ## how long each scenario takes to build
 	$(PYTHON) tests/benchmarks/scenario_building.py
