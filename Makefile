@@ -30,7 +30,7 @@ quick:           ## the default study
 
 benchmark:       ## how fast the harness is, against its peers (let nothing else run)
 	$(PYTHON) -m pip install --quiet -e ".[peers,drake]" && $(PYTHON) tests/benchmarks/ratios.py \
-	  && $(PYTHON) tests/benchmarks/lockstep.py
+	  && $(PYTHON) tests/benchmarks/peer_ratios.py && $(PYTHON) tests/benchmarks/lockstep.py
 
 benchmark-scenarios:  ## how long each scenario takes to build
 	$(PYTHON) tests/benchmarks/scenario_building.py
@@ -51,7 +51,7 @@ benchmark-metrics:  ## what metrics and rechecks cost per step, alone and togeth
 benchmark-peers: ## whole ticks and velocities of other libraries beside ours (minutes)
 	$(PYTHON) -m pip install --quiet -e ".[peers,drake]" && $(PYTHON) -m dikbench run peers
 
-constraints:     ## the installed versions become the tested ones
+constraints:     ## the installed versions become the tested ones (of peers too: `make benchmark-peers` first)
 	.venv/bin/pip freeze --exclude-editable --exclude pip --exclude setuptools > constraints.txt
 
 .PHONY: help setup test test-long test-random lint format contract quick benchmark benchmark-scenarios benchmark-solvers benchmark-laws benchmark-metrics benchmark-peers mutation constraints

@@ -37,6 +37,8 @@ from formulations.qp_velocity import QpVelocity
 from formulations.selective_damping import SelectiveDamping
 from formulations.singular_value_filtering import SingularValueFiltering
 from formulations.sns import SaturationInNullSpace
+from formulations.sns_fast import FastSaturationInNullSpace
+from formulations.sns_margin import SaturationWithScaleMargin
 from formulations.sns_optimal import OptimalSaturationInNullSpace
 from formulations.truncated_svd import TruncatedSvd
 from formulations.variable_damping import VariableDamping
@@ -67,7 +69,9 @@ FORMULATIONS: Mapping[str, type[Formulation]] = MappingProxyType(
         "nullspace-robust": NullspaceRobust,
         "nullspace-unprojected": NullspaceUnprojected,
         "sns": SaturationInNullSpace,
+        "sns-fast": FastSaturationInNullSpace,
         "sns-optimal": OptimalSaturationInNullSpace,
+        "sns-margin": SaturationWithScaleMargin,
         "qp": WeightedQp,
         "qp-velocity": QpVelocity,
         "hqp": HierarchicalQp,

@@ -19,6 +19,9 @@ STEADY_JOINTS: Final = frozenset(
 SPATIAL: Final = (0, 1, 2, 3, 4, 5)
 PLANAR: Final = (0, 1, 5)
 
+_NEXT: Final = [1, 2, 0]
+_AFTER: Final = [2, 0, 1]
+
 ROUNDING: Final = 1e-9
 """Entries of a Jacobian up to this (m, rad) are zero."""
 
@@ -29,7 +32,11 @@ def manipulability_gradient(J: Array, before: Sequence[int] | None = None) -> Ar
         dw/dq_k = w tr(J^+ dJ/dq_k),   dJ_j/dq_k = [J_j, J_k] for a joint k after joint j, else 0
 
     with [a, b] the Lie bracket of two body twists (linear; angular), columns in the order of the
-    chain; zero where w is zero. In tangent coordinates: that of a free-flyer at the root is zero,
+    chain. With the columns (v; w) of J and (a; b) of (J^+)^T its trace is
+
+        w_k . sum_j (a_j x v_j + b_j x w_j) + v_k . sum_j a_j x w_j
+
+    Zero where w is zero. In tangent coordinates: that of a free-flyer at the root is zero,
     since moving the whole robot changes no body Jacobian. For a planar arm, J has three rows
     (x, y; yaw).
 
@@ -49,20 +56,16 @@ def manipulability_gradient(J: Array, before: Sequence[int] | None = None) -> Ar
     if singular[-1] <= np.finfo(float).eps * n * singular[0]:
         return np.zeros(n)
     inverse = (U / singular).dot(Vt)  # (J^+)^T
-    linear, angular = (J[:3], J[3:]) if m == 6 else (_in_space(J[:2], 0), _in_space(J[2:], 2))
     if before is None:
         before = [*range(n)]
         if m == 6 and _is_free(J[:, :6]):
             before[:6] = [0] * 6
-    gradient = np.zeros(n)
-    for k, j in enumerate(before):
-        if j == 0:
-            continue
-        v, w = linear[:, k : k + 1], angular[:, k : k + 1]
-        turned = np.cross(angular[:, :j], w, axis=0)
-        moved = np.cross(linear[:, :j], w, axis=0) + np.cross(angular[:, :j], v, axis=0)
-        change = np.vstack([moved, turned]) if m == 6 else np.vstack([moved[:2], turned[2:]])
-        gradient[k] = np.einsum("ij,ij->", inverse[:, :j], change)
+    v, w, a, b = (part.T for part in (*_parts(J), *_parts(inverse)))
+    turning, moving = _crossed(a, v) + _crossed(b, w), _crossed(a, w)
+    sums = np.zeros((2, n + 1, 3))  # over the columns before each
+    np.cumsum([turning, moving], axis=1, out=sums[:, 1:])
+    turning, moving = sums[:, [*before]]
+    gradient = np.vecdot(w, turning) + np.vecdot(v, moving)
     result: Array = singular.prod() * gradient
     return result
 
@@ -107,8 +110,15 @@ def _is_free(block: Array) -> bool:
     return bool(steady + np.abs(R.T @ R - np.eye(3)).max() <= ROUNDING)
 
 
-def _in_space(rows: Array, first: int) -> Array:
-    """Write the rows of a planar twist as the three of a spatial one."""
-    spatial = np.zeros((3, rows.shape[1]))
-    spatial[first : first + len(rows)] = rows
-    return spatial
+def _parts(rows: Array) -> tuple[Array, Array]:
+    """Split the six rows of twists, or the three of planar ones, into linear and angular ones."""
+    if len(rows) == 6:
+        return rows[:3], rows[3:]
+    spatial = np.zeros((6, rows.shape[1]))
+    spatial[[*PLANAR]] = rows
+    return spatial[:3], spatial[3:]
+
+
+def _crossed(a: Array, b: Array) -> Array:
+    """Compute a x b of each of two arrays (n, 3); `np.cross` takes ten times as long."""
+    return a[:, _NEXT] * b[:, _AFTER] - a[:, _AFTER] * b[:, _NEXT]

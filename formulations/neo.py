@@ -54,8 +54,9 @@ class Neo(Parameters):
         damper_gain: eta [1/s], the speed at the influence distance [rad/s].
         stop_distance: rho_s [rad].
         influence_distance: rho_0 [rad].
+        influence_share: rho_0 over the joint's range in its place; 0: `influence_distance`.
 
-    Source: [HavilandCorke2021].
+    Source: [HavilandCorke2021]; the share of the range is that of [HavilandCorke2023].
     """
 
     velocity_weight: Annotated[float, Range(above=0.0), Drawn(1e-3, 0.1, log=True)] = 0.01
@@ -63,6 +64,7 @@ class Neo(Parameters):
     damper_gain: Annotated[float, Range(above=0.0, unit="1/s"), Drawn(0.1, 3.0, log=True)] = 1.0
     stop_distance: Annotated[float, Range(0.0, unit="rad"), Drawn(0.01, 0.2)] = 0.05
     influence_distance: Annotated[float, Range(above=0.0, unit="rad"), Drawn(0.3, 1.2)] = 0.9
+    influence_share: Annotated[float, Range(0.0, high=0.5)] = 0.0
 
     program: ClassVar[ProgramKind] = "qp"
     keeps: ClassVar[frozenset[LimitKind]] = frozenset({"velocity"})
@@ -70,7 +72,7 @@ class Neo(Parameters):
     def check(self) -> None:
         """Check that joints are slowed down before they are stopped."""
         near, far = self.stop_distance, self.influence_distance
-        if near >= far:
+        if near >= far and not self.influence_share:
             raise DikbenchError(f"stop_distance={near} must be below influence_distance={far}")
 
     def refuses(self, problem: DikProblem) -> str:
@@ -120,12 +122,21 @@ class Neo(Parameters):
         lower = np.full(n, -np.inf) if velocity is None else velocity.lower
         upper = np.full(n, np.inf) if velocity is None else velocity.upper
         if limits.to_lower is not None and limits.to_upper is not None:
-            lower = np.maximum(lower, -self._damper(limits.to_lower, -lower))
-            upper = np.minimum(upper, self._damper(limits.to_upper, upper))
+            influence = self._influence(limits)
+            lower = np.maximum(lower, -self._damper(limits.to_lower, -lower, influence))
+            upper = np.minimum(upper, self._damper(limits.to_upper, upper, influence))
         return lower, upper
 
-    def _damper(self, distance: Array, free: Array) -> Array:
+    def _influence(self, limits: Limits) -> Array:
+        """Compute rho_0 of each joint, (nv,) [rad]; 0 for one that turns without end."""
+        position = limits.joint.position
+        if not self.influence_share or position is None:
+            return np.full(limits.joint.nv, self.influence_distance)
+        reach = self.influence_share * (position.upper - position.lower)
+        return np.where(np.isfinite(reach), np.maximum(reach, self.stop_distance), 0.0)
+
+    def _damper(self, distance: Array, free: Array, influence: Array) -> Array:
         """Compute the speed allowed towards a limit at a distance, (nv,) [rad/s]."""
-        share = (distance - self.stop_distance) / (self.influence_distance - self.stop_distance)
-        slowed = self.damper_gain * np.maximum(share, 0.0)
-        return np.where(distance < self.influence_distance, slowed, free)
+        span = np.maximum(influence - self.stop_distance, np.finfo(float).tiny)
+        slowed = self.damper_gain * np.maximum((distance - self.stop_distance) / span, 0.0)
+        return np.where(distance < influence, slowed, free)

@@ -1,7 +1,8 @@
-"""Saturation in the null space, level by level: the part that `sns` and `sns-optimal` share."""
+"""Saturation in the null space, level by level: the part that the laws of its family share."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,6 @@ from dikbench.problem import (
     Array,
     Box,
     DikProblem,
-    LinearizedTask,
     inverse_and_row_space,
     solve_positive_definite,
 )
@@ -41,13 +41,46 @@ class _Held(NamedTuple):
     effect: Array
 
 
+class _Found(NamedTuple):
+    """What came of a level.
+
+    Attributes:
+        velocity: a s + b, but for rounding, (nv,).
+        scale: s, at most 1.
+        a: change of the velocity per unit of s with these joints held, (nv,).
+        b: velocity at s = 0 with these joints held, (nv,).
+        held: the joints.
+    """
+
+    velocity: Array
+    scale: float
+    a: Array
+    b: Array
+    held: tuple[int, ...]
+
+    def reach(self, box: Box) -> float:
+        """Compute the largest scale, above 1 as well, for which the held joints are enough."""
+        if self.scale < 1:
+            return self.scale
+        moves = np.abs(self.a) > NEGLIGIBLE_SPEED_RAD_S
+        moves[list(self.held)] = False
+        room = np.where(self.a > 0, box.upper, box.lower) - self.b
+        return float((room[moves] / self.a[moves]).min(initial=np.inf))
+
+
 def saturated_levels(
-    problem: DikProblem, box: Box, rank_tolerance: float, *, optimal: bool
+    problem: DikProblem,
+    box: Box,
+    rank_tolerance: float,
+    *,
+    optimal: bool,
+    scale_margin: float = 1.0,
 ) -> Array:
     """Do every priority level in the null space of those above, inside the box.
 
     Where the box excludes rest, as under acceleration limits in motion, the least velocity may have
-    too many joints outside the box; then the least change of velocity is tried.
+    too many joints outside the box; then the least change of velocity is tried. A level that
+    reaches a scale s with s `scale_margin` < 1 is done again, scaled by that product.
 
     Raises:
         Infeasible: if no scale of the first task was found that fits the box.
@@ -55,12 +88,19 @@ def saturated_levels(
     v, N = np.zeros(problem.robot.nv), np.eye(problem.robot.nv)
     levels = problem.levels
     for number, level in enumerate(levels):
-        found = _saturated(level, v, N, box, rank_tolerance, optimal=optimal)
+        start = v
+        found = _saturated(level.J, level.V, start, N, box, rank_tolerance, optimal=optimal)
         if found is None and number == 0 and problem.v_prev is not None:
-            start = _inside(problem.v_prev, box)
-            found = _saturated(level, start, N, box, rank_tolerance, optimal=optimal)
+            start = inside(problem.v_prev, box)
+            found = _saturated(level.J, level.V, start, N, box, rank_tolerance, optimal=optimal)
+        if found is not None and scale_margin < 1:
+            scale = scale_margin * found.reach(box)
+            if 0 < scale < 1:
+                V = scale * level.V
+                again = _saturated(level.J, V, start, N, box, rank_tolerance, optimal=optimal)
+                found = again or found
         if found is not None:
-            v = found
+            v = found.velocity
         elif number == 0:
             raise Infeasible("saturation in the null space: no scale of the task fits the box")
         if number + 1 < len(levels):
@@ -70,34 +110,34 @@ def saturated_levels(
 
 
 def _saturated(
-    level: LinearizedTask, start: Array, N: Array, box: Box, tolerance: float, *, optimal: bool
-) -> Array | None:
+    J: Array, V: Array, start: Array, N: Array, box: Box, tolerance: float, *, optimal: bool
+) -> _Found | None:
     """Find the velocity of one level from `start` in the range of the projector N, or None."""
     bounds: dict[int, float] = {}  # of the saturated joints
     rank = None
-    best, best_scale = None, -1.0
+    best: _Found | None = None
     for _ in range(2 * len(start) + 1):  # freeing joints may cycle
         held = _hold(bounds, start, N)
         if held is None:
             break
-        inverse, rows = inverse_and_row_space(level.J @ held.free, tolerance)
+        inverse, rows = inverse_and_row_space(J @ held.free, tolerance)
         rank = len(rows) if rank is None else rank
         if len(rows) < rank:
             break
-        a = inverse @ level.V
-        b = held.base - inverse @ (level.J @ held.base)
-        scale, critical = _scale(a, b, box, bounds)
-        if scale > best_scale:
-            best, best_scale = _inside(b + scale * a, box), scale
+        a = inverse @ V
+        b = held.base - inverse @ (J @ held.base)
+        scale, critical = fitting_scale(a, b, box, bounds)
+        if scale > (-1.0 if best is None else best.scale):
+            best = _Found(inside(b + scale * a, box), scale, a, b, (*bounds,))
         if optimal and scale >= 0:
             moved = b + scale * a - start  # by this level
-            wrong = _wrong_side(moved, held.effect, inverse @ level.J, box, bounds)
+            wrong = _wrong_side(moved, held.effect, inverse @ J, box, bounds)
             for joint in wrong:
                 del bounds[joint]
             if wrong:
                 continue
         if critical is None:
-            return _inside(a + b, box)
+            return _Found(inside(a + b, box), 1.0, a, b, (*bounds,))
         if held.free[critical, critical] <= SMALLEST_SQUARED_FREEDOM:
             break
         outwards = a[critical] + b[critical] > box.upper[critical]
@@ -105,7 +145,7 @@ def _saturated(
     return best
 
 
-def _inside(v: Array, box: Box) -> Array:
+def inside(v: Array, box: Box) -> Array:
     """Clip rounding errors to the box (nv,); faster than `np.clip`."""
     held: Array = np.minimum(np.maximum(v, box.lower), box.upper)
     return held
@@ -125,7 +165,7 @@ def _hold(bounds: dict[int, float], start: Array, N: Array) -> _Held | None:
     return _Held(start + effect @ gap, N - effect @ rows, effect)
 
 
-def _scale(a: Array, b: Array, box: Box, bounds: dict[int, float]) -> tuple[float, int | None]:
+def fitting_scale(a: Array, b: Array, box: Box, bounds: Iterable[int]) -> tuple[float, int | None]:
     """Compute the largest scale s <= 1 with a s + b in the box, and the joint to hold next.
 
     The scale is -1 where no scale s >= 0 fits. The joint is, among those outside at s = 1, the one

@@ -18,12 +18,30 @@ from dikbench.published.agreement import Agreement
 from dikbench.published.bargain import Bargain
 from dikbench.published.circle import Circle
 from dikbench.published.folder import FOLDER
+from dikbench.published.gap import Gap
+from dikbench.published.leaking import Leak
 from dikbench.published.lecture import Matrix, Statements
 from dikbench.published.measured import Measured, Statistic
+from dikbench.published.outside import Outside
 from dikbench.published.searches import Searches
+from dikbench.published.small_angles import SmallAngles
+from dikbench.published.stopping_early import StoppingEarly
 from dikbench.published.twists import Twists
 
-Protocol = Searches | Twists | Circle | Agreement | Statements | Matrix | Bargain
+Protocol = (
+    Searches
+    | Twists
+    | Circle
+    | Agreement
+    | Statements
+    | Matrix
+    | Bargain
+    | Leak
+    | StoppingEarly
+    | Gap
+    | SmallAngles
+    | Outside
+)
 
 
 class Row(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

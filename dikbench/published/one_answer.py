@@ -10,8 +10,9 @@ import numpy as np
 from dikbench.arrays import Array
 from dikbench.errors import CannotAnswer, DikbenchError
 from dikbench.plugins.building import make_formulation
+from dikbench.problem.constraints import Constraint
 from dikbench.problem.posing import pose_problem
-from dikbench.problem.problem import program_of, refusal_of
+from dikbench.problem.problem import not_installed, program_of, refusal_of
 from dikbench.problem.tasks import LinearizedTask, Task
 from dikbench.published.folder import FOLDER
 from dikbench.robots.kinematics import Kinematics
@@ -20,28 +21,36 @@ from dikbench.robots.robot import Robot
 from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, parse_solver
 from dikbench.solvers.checked_solve import make_solve
 
-Answer = Callable[[Kinematics, float, LinearizedTask, Sequence[Task]], Array]
+Answer = Callable[..., Array]
 
 EXACT: Final = 1e-9
 """Differences up to this share are rounding."""
 
 
-def answering(formulation: str) -> Answer:
-    """Return what a formulation's selector answers: (kinematics, dt, task, other tasks) -> v.
+def answering(formulation: str, solver: str = "") -> Answer:
+    """Return what a formulation's selector answers: (kinematics, dt, task, others, rows) -> v.
 
-    It is NaN where the formulation has no answer.
+    It is NaN where the formulation has no answer. A solver is the default one where none is named.
 
     Raises:
-        DikbenchError: if there is no such formulation; by the answer, if it refuses the problem.
+        DikbenchError: if there is no such formulation, or its package is not installed; by the
+            answer, if it refuses the problem.
     """
     law = make_formulation(formulation)
+    if missing := not_installed(law):
+        raise DikbenchError(missing)
     program = program_of(law)
-    solve = make_solve(None if program is None else parse_solver(DEFAULT_SOLVER[program]), program)
+    text = "" if program is None else solver or DEFAULT_SOLVER[program]
+    solve = make_solve(parse_solver(text) if text else None, program)
 
     def answer(
-        kinematics: Kinematics, dt: float, tracking: LinearizedTask, tasks: Sequence[Task] = ()
+        kinematics: Kinematics,
+        dt: float,
+        tracking: LinearizedTask,
+        tasks: Sequence[Task] = (),
+        constraints: Sequence[Constraint] = (),
     ) -> Array:
-        problem = pose_problem(kinematics, None, dt, tracking, tasks)
+        problem = pose_problem(kinematics, None, dt, tracking, tasks, constraints)
         reason = refusal_of(law, problem)
         if reason:
             raise DikbenchError(f"{formulation}: {reason}")

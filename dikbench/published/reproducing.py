@@ -5,13 +5,24 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from concurrent.futures import as_completed
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
+
+import msgspec
 
 from dikbench.errors import DikbenchError, in_words
+from dikbench.plugins.building import make_formulation
+from dikbench.problem.problem import program_of
 from dikbench.published.experiment import Experiment, Row, load_experiment, published_experiments
 from dikbench.published.measured import Measured, Statistic, verdict
+from dikbench.published.searches import Searches
 from dikbench.run.pool import workers
 from dikbench.run.progress_display import ProgressDisplay
+
+UNKNOWN_ITERATIONS: Final = 100.0
+"""Mean iterations of a search, where none were published."""
+
+OF_A_SOLVER: Final = 30.0
+"""Time of a step of one search by a solver, over that of one of many at once without."""
 
 EXPLANATION = """\
 Each cell is *published / here*; "± x" is half of the noise band, two standard errors of the sample
@@ -56,10 +67,7 @@ def reproduce(names: Sequence[str], jobs: int) -> dict[str, list[Reproduced]]:
     measured: dict[tuple[str, int], Any] = {}
     with workers(jobs) as pool, ProgressDisplay(len(todo), "rows") as display:
         # The longest rows first, as far as it is known, so that none is left for the end.
-        todo.sort(
-            key=lambda key: experiments[key[0]].rows[key[1]].published.get("mean_iterations", 0.0),
-            reverse=True,
-        )
+        todo.sort(key=lambda key: _work(experiments[key[0]], key[1]), reverse=True)
         waiting = {pool.schedule(measure_row, args=(*key,)): key for key in todo}
         for future in as_completed(waiting):
             measured[waiting[future]] = future.result()
@@ -71,6 +79,17 @@ def reproduce(names: Sequence[str], jobs: int) -> dict[str, list[Reproduced]]:
         ]
         for name, experiment in experiments.items()
     }
+
+
+def _work(experiment: Experiment, number: int) -> float:
+    """Estimate, roughly, the steps of a row of searches; those of a solver count many times."""
+    protocol, row = experiment.protocol, experiment.rows[number]
+    if not isinstance(protocol, Searches):
+        return 0.0
+    rules = msgspec.structs.replace(protocol, **row.settings)
+    steps = row.published.get("mean_iterations", UNKNOWN_ITERATIONS)
+    alone = program_of(make_formulation(row.formulation)) is not None
+    return steps * (rules.first or rules.targets) * (OF_A_SOLVER if alone else 1.0)
 
 
 def measure_row(name: str, number: int) -> dict[str, Measured] | str:

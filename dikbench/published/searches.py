@@ -158,12 +158,12 @@ class _Searching:
         """Search until each target is reached or given up.
 
         Searches do not depend on each other: where few targets are left, several of each are made
-        at once, and the first that reaches it counts.
+        at once, and the first that reaches it counts, unless each step is asked for alone.
         """
         left, tried = np.arange(len(self._translations)), 0
-        found = _Found.nothing(len(left))
+        found, at_once = _Found.nothing(len(left)), TOGETHER if self._together else 0
         while len(left) and tried < self._rules.searches:
-            block = min(max(1, TOGETHER // len(left)), self._rules.searches - tried)
+            block = min(max(1, at_once // len(left)), self._rules.searches - tried)
             shape = len(left), block
             pairs = np.broadcast_to(left[:, None], shape), tried + np.indices(shape)[1]
             many = self._searched(*(np.ravel(each) for each in pairs))

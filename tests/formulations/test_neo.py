@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
-from makers.problems import random_step, random_steps, velocity_of
+from makers.problems import kinematics_at, problem_at, random_step, random_steps, velocity_of
 
 from dikbench.arrays import Array
+from dikbench.problem import LinearizedTask
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.loading import load_robot
 from dikbench.testing.states import SINGULAR
@@ -25,6 +26,32 @@ def test_neo_without_its_reward_is_damped_least_squares() -> None:
         e = float(np.abs(task.error).sum())
         damped = velocity_of(f"dls[damping={float(np.sqrt(0.01 * e))!r}]", problem)
         assert velocity_of("neo[manipulability_gain=0]", problem) == pytest.approx(damped, abs=1e-6)
+
+
+def test_neos_dampers_reach_over_a_share_of_each_range() -> None:
+    """Half of it: one of the two is active wherever a joint is, to rest at the stop distance.
+
+    v_i <= eta (d - rho_s)/(range/2 - rho_s), d to the nearer limit; none towards the other.
+    """
+    robot = load_robot("panda").with_limits(velocity=None)
+    position = robot.limits.position
+    assert position is not None
+    law = "neo[damper_gain=0.5,stop_distance=0.001,influence_share=0.5,manipulability_gain=0]"
+    random, active, fast = np.random.default_rng(5), 0, 0
+    half = (position.upper - position.lower) / 2
+    for _ in range(20):
+        q = random.uniform(position.lower, position.upper)
+        J = kinematics_at(robot, q).task_jacobian()
+        task = LinearizedTask(J, J @ random.uniform(-3, 3, 7), np.full(6, 0.01))
+        v = velocity_of(law, problem_at(robot, q, [task]))
+        to_upper, to_lower = position.upper - q, q - position.lower
+        bound = 0.5 * np.maximum(np.minimum(to_upper, to_lower) - 0.001, 0) / (half - 0.001)
+        towards = np.where(to_upper < to_lower, v, -v)
+        assert (towards <= bound + 1e-6).all()
+        active += int((towards > bound - 1e-6).sum())
+        fast += int((towards < -0.5).sum())
+    assert active > 20
+    assert fast > 20
 
 
 def test_neos_reward_raises_the_manipulability() -> None:

@@ -25,7 +25,7 @@ ELBOW: Final[dict[str, Any]] = {
 WEIGHTS: Final = np.array([0.3, 2.0, 5.0, 0.1, 1.0, 3.0])
 WEIGHS: Final = {"qp", "hqp", "lm", "lm-null-space", "pink-qp", "mink-qp"}
 SEES_LOWER: Final = {
-    *{"qp", "hqp", "pink-qp", "mink-qp", "sns", "sns-optimal"},
+    *{"qp", "hqp", "pink-qp", "mink-qp", "sns", "sns-fast", "sns-optimal", "sns-margin"},
     *{"nullspace", "nullspace-robust", "nullspace-unprojected"},
 }
 SEES_POSTURES: Final = {"alpha-two-stage", "drake-system"}

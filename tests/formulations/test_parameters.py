@@ -27,7 +27,9 @@ NOT_NEGATIVE = [
     ("nullspace-robust", "damping"),
     ("nullspace-unprojected", "rank_tolerance"),
     ("sns", "rank_tolerance"),
+    ("sns-fast", "rank_tolerance"),
     ("sns-optimal", "rank_tolerance"),
+    ("sns-margin", "rank_tolerance"),
 ]
 
 

@@ -260,9 +260,6 @@ def test_a_joint_without_acceleration_limit_at_its_position_limit_has_no_brake(l
     assert velocity_of(f"{law}[damping=0.01]", problem) == pytest.approx(expected, abs=1e-8)
 
 
-# --- NEO
-
-
 # --- kernels
 
 matrices = arrays(float, (3, 5), elements=st.integers(-3, 3).map(float))
@@ -302,6 +299,7 @@ def test_the_null_space_is_orthonormal_and_complete(A: Array) -> None:
         ),
         ("hqp[damping=-1]", "hqp: damping=-1.0 must be finite"),
         ("neo[stop_distance=1]", "neo: stop_distance=1.0 must be below influence_distance=0.9"),
+        ("neo[influence_share=0.6]", "neo: influence_share=0.6 must be"),
         ("pink-qp[position_gain=0]", "pink-qp: position_gain=0.0 must be above 0"),
         ("mink-qp[lm_damping=-1]", "mink-qp: lm_damping=-1.0 must be finite"),
         ("qp-velocity[damping=inf]", "qp-velocity: damping=inf must be finite"),

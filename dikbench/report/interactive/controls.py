@@ -131,7 +131,8 @@ def _list(
     name: str, label: str, options: Sequence[str | tuple[str, str]], test: str = ""
 ) -> Control:
     pairs = tuple((each, each) if isinstance(each, str) else each for each in options)
-    return Control(name, label, pairs, pairs[0][0], test)
+    first = pairs[0][0] if pairs else ""  # as of a run of targets at rest: nothing to choose
+    return Control(name, label, pairs, first, test)
 
 
 def _found(rows: pd.DataFrame, column: str) -> list[str]:

@@ -11,7 +11,7 @@ from dikbench.cli.describing import description
 from dikbench.errors import DikbenchError
 from dikbench.plugins.finding import plugins
 from dikbench.scenario.oracle import ORACLES
-from dikbench.selector import parse_selector
+from dikbench.selector import alternatives, parse_selector
 from dikbench.solvers.catalogue.back_ends import parse_solver
 from dikbench.study.explained import VALID
 from dikbench.study.plan import expand
@@ -67,6 +67,25 @@ def test_every_shipped_study_expands_to_trials_with_distinct_ids(name: str) -> N
     planned = expand(study)
     assert planned
     assert len({p.id for p in planned}) == len(planned)
+
+
+@pytest.mark.parametrize("name", [name for name in shipped_studies()
+                                  if load_study(name).description.startswith("All ")])  # fmt: skip
+def test_a_study_of_all_formulations_has_every_one(name: str) -> None:
+    """Those that are registered, peers apart; where their description counts them it is right."""
+    study = load_study(name)
+    texts = [text for cell in study.cells for text in cell.formulations]
+    named = {parse_selector(text).name for text in texts}
+    assert named - set(ORACLES) == {*plugins("formulation")}
+    counted = re.match(r"All (\d+) formulations on (\d+) scenarios of (\d+) families", (
+        study.description
+    ))  # fmt: skip
+    assert bool(counted) != bool(study.instances)
+    if counted:
+        scenarios = [each for text in study.scenarios for each in alternatives(text)]
+        families = {each.name for each in scenarios}
+        sizes = (len(plugins("formulation")), len(scenarios), len(families))
+        assert tuple(int(number) for number in counted.groups()) == sizes
 
 
 def test_quick_covers_laws_families_and_solvers() -> None:
