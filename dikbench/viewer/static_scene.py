@@ -106,6 +106,9 @@ def surroundings(scenario: Scenario, q: Array | None = None) -> Surroundings:
         seen = points_in_view(scenario, scenario.q0[None] if q is None else q)
         camera_of(seen, side_of(robot, path)).place(server)
         messages = messages_of(server)[before:]
+    for message in messages:
+        if "initial" in message:  # a scene that has its first camera already takes no other one
+            message["initial"] = False
     return Surroundings(messages, np.round(path, 4).tolist())
 
 

@@ -180,6 +180,13 @@ def test_colours_and_surroundings(page: Any, robot: Robot) -> None:
         return ["/obstacles/0", "/path", "/target"].every(node => tree[node]) &&
           SCENE.joints.every(j => !j.body || tree[j.body].message.props.color[0] === 213)"""
     WebDriverWait(page, LONGEST_WAIT_S).until(lambda d: d.execute_script(there))
+    # The camera of the surroundings takes the place of that of the scene.
+    [at] = [each["position"] for each in around.messages if "CameraPosition" in each["type"]]
+    away = "return FRAME.contentWindow.__viserMutable.camera.position.length() - arguments[0]"
+    distance = float(np.linalg.norm(at))
+    WebDriverWait(page, LONGEST_WAIT_S).until(
+        lambda d: abs(d.execute_script(away, distance)) < 1e-2 * distance
+    )
     pose = np.eye(4)
     pose[:3, 3] = 0.5, 0.25, 0.75
     np.testing.assert_allclose(poses(page, {"/target": pose})["/target"], pose, atol=1e-6)

@@ -55,7 +55,7 @@ def test_a_bar_leads_to_its_trials_and_a_trial_to_its_run(
     assert row["scenario"] in title
     assert row["contender"] in title
     assert f"dikbench replay {trial}" in commands
-    assert f"--formulation {quote(row['formulation'])}" in commands
+    assert f"--formulation {quote(str(row['formulation']))}" in commands
     assert f"trial={trial}" in page.current_url
     recording = find_recording(trial, played)
     told = page.execute_script("return document.getElementById('run-certificate').textContent")
