@@ -260,9 +260,6 @@ def test_a_joint_without_acceleration_limit_at_its_position_limit_has_no_brake(l
     assert velocity_of(f"{law}[damping=0.01]", problem) == pytest.approx(expected, abs=1e-8)
 
 
-# --- NEO
-
-
 # --- kernels
 
 matrices = arrays(float, (3, 5), elements=st.integers(-3, 3).map(float))

@@ -221,9 +221,6 @@ def test_steps_that_go_nowhere_are_stuck() -> None:
         assert run.trace.share(Status.STUCK) == stuck
 
 
-# --- the fallback
-
-
 def test_a_run_that_is_given_up_keeps_its_torques() -> None:
     """No answer from the fastest part of the way on: the arm brakes within its torques."""
     scenario, steps = make_scenario("torque-limited[robot=ur5]"), 0
