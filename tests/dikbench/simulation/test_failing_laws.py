@@ -1,4 +1,4 @@
-"""Laws that go wrong: how they end a trial, the status of a step, and the fallback."""
+"""Laws that go wrong: how they end a trial, and the status of a step."""
 
 from __future__ import annotations
 
