@@ -1,4 +1,4 @@
-"""The contract suite, on every registered formulation and on laws that break it on purpose."""
+"""The contract suite on every registered formulation."""
 
 from __future__ import annotations
 

@@ -317,6 +317,3 @@ def test_redundant_arms_hold_a_posture_and_others_have_no_second_task(
     assert np.array_equal(task.target, scenario.q0)
     assert task.priority > 1
     assert task.weight == pytest.approx(1e-4)
-
-
-# --- scenarios that are not what they say

@@ -1,4 +1,4 @@
-"""Laws that go wrong: how they end a trial, the status of a step, and the fallback."""
+"""Laws that go wrong: how they end a trial, and the status of a step."""
 
 from __future__ import annotations
 
@@ -219,9 +219,6 @@ def test_steps_that_go_nowhere_are_stuck() -> None:
     for share, stuck in ((0.0099, 1.0), (0.0101, 0.0), (-0.5, 1.0)):
         run = run_on_planar(partial(_a_share, share))
         assert run.trace.share(Status.STUCK) == stuck
-
-
-# --- the fallback
 
 
 def test_a_run_that_is_given_up_keeps_its_torques() -> None:

@@ -217,7 +217,7 @@ def test_the_ideal_plant_applies_the_command() -> None:
     assert np.array_equal(run.trace.applied, run.trace.commanded)
 
 
-# --- the same again, and the trace
+# --- the same again
 
 
 ALIKE = (
