@@ -8,7 +8,7 @@ import pytest
 from makers.problems import kinematics_at, problem_at, random_step, random_steps, velocity_of
 
 from dikbench.arrays import Array
-from dikbench.problem import LinearizedTask
+from dikbench.problem.tasks import LinearizedTask
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.loading import load_robot
 from dikbench.testing.states import SINGULAR
