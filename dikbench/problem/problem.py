@@ -133,6 +133,8 @@ class Formulation(Protocol):
     `DikProblem`), (N, nv), each as if it were alone: matrices with the functions of
     `dikbench.problem`, everything else element by element or over the last axis. NaN in a row
     stands for an answer that it has to be asked for alone.
+
+    With `strict = True` it promises that no task of lower priority costs the first one anything.
     """
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
@@ -158,6 +160,11 @@ def promises_of(formulation: Formulation) -> frozenset[LimitKind]:
 def computes_kinematics(formulation: Formulation) -> bool:
     """Whether the formulation computes kinematics of its own, as part of its call."""
     return bool(getattr(formulation, "computes_kinematics", False))
+
+
+def is_strict(formulation: Formulation) -> bool:
+    """Whether the formulation promises that lower tasks cost the first priority nothing."""
+    return bool(getattr(formulation, "strict", False))
 
 
 def not_installed(formulation: Formulation | type) -> str:

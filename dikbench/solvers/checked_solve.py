@@ -161,6 +161,10 @@ def _back_end(solver: Solver, program: ProgramKind) -> BackEnd:
         from dikbench.solvers.interfaces.warm import WarmSolver
 
         return WarmSolver(solver)
+    if solver.library is not None:
+        from dikbench.solvers.interfaces.of_library import LibrarySolver
+
+        return LibrarySolver(solver.library)
     from dikbench.solvers.interfaces.cold import ColdSolver
 
     return ColdSolver(solver)

@@ -7,7 +7,7 @@ from functools import partial
 from types import MappingProxyType
 from typing import Final, Literal, NamedTuple
 
-from dikbench.problem.problem import Formulation, LimitKind, is_batched, promises_of
+from dikbench.problem.problem import Formulation, LimitKind, is_batched, is_strict, promises_of
 from dikbench.scenario.family import Family
 from dikbench.testing.asked import Asked
 from dikbench.testing.cannot_check import CannotCheck
@@ -21,6 +21,7 @@ from dikbench.testing.contract import (
     check_velocity_limits,
 )
 from dikbench.testing.family import FAMILY_CHECKS, check_family_declaration
+from dikbench.testing.priority import check_priority
 from dikbench.testing.rows import check_rows
 
 PROMISES: Final[Mapping[Check, LimitKind]] = MappingProxyType(
@@ -61,7 +62,9 @@ def verdicts_on_formulation(
     for check in CHECKS[1:]:
         name = check.__name__.removeprefix("check_").replace("_", " ")
         promised = PROMISES[check] in promises_of(formulation) if check in PROMISES else True
-        if not promised or (check is check_rows and not is_batched(formulation)):
+        promised &= check is not check_rows or is_batched(formulation)
+        promised &= check is not check_priority or is_strict(formulation)
+        if not promised:
             yield Verdict(name, "not promised")
         else:
             yield _verdict(name, partial(check, asked, None), causes)

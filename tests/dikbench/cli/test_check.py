@@ -108,7 +108,7 @@ def test_a_formulation_that_keeps_its_promises(plugins_file: Path) -> None:
     found = outcomes(lines)
     assert code == 0
     assert len(found) == len(lines) == len(CHECKS)
-    promises = {"position limits", "acceleration limits", "inequalities", "rows"}
+    promises = {"position limits", "acceleration limits", "inequalities", "priority", "rows"}
     assert {name for name, outcome in found.items() if outcome == "not promised"} == promises
     assert {outcome for name, outcome in found.items() if name not in promises} == {"kept"}
 

@@ -10,10 +10,10 @@ import pytest
 from makers.programs import ACCURACY, INSTALLED, LIBRARIES_WARN, mixture, projection, solve_with
 
 from dikbench.errors import DikbenchError
+from dikbench.solvers.catalogue.back_end import Interface
 from dikbench.solvers.catalogue.back_ends import (
     BACK_ENDS,
     DEFAULT_SOLVER,
-    Interface,
     Solver,
     parse_solver,
     why_not,
