@@ -10,14 +10,16 @@ import importlib.metadata
 import importlib.util
 import os.path
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Final, Literal
 
 from dikbench.errors import DikbenchError, in_words, unknown
+from dikbench.selector import Selector
 
 Kind = Literal["formulation", "scenario", "solver", "plant", "robot", "metric"]
 
@@ -116,6 +118,11 @@ def in_file(name: str) -> bool:
     return name.rpartition(":")[0].endswith(".py") or name.endswith(".py")
 
 
+def names_code(selector: Selector) -> bool:
+    """Say whether a selector names code in a file: itself, or by a parameter (a robot, `then`)."""
+    return any(map(in_file, (selector.name, *selector.parameters.values())))
+
+
 def named_in_file(name: str, fits: Callable[[Any], bool], nothing: str) -> Named:
     """Import what `path/to/file.py:Name` names.
 
@@ -198,14 +205,36 @@ def registered(kind: str) -> Mapping[str, Named]:
     return found
 
 
-def entries_of(table: str) -> Iterator[Named]:
+def add_entry_points(points: Iterable[EntryPoint], folders: Iterable[Path]) -> None:
+    """Have the entry points of a project that need not be installed found, in this process alone.
+
+    Args:
+        points: its entry points.
+        folders: where its modules are.
+    """
+    for folder in folders:
+        sys.path.insert(0, str(folder.absolute()))
+    known = {(point.group, point.name, point.value) for point in _OF_PROJECTS}
+    _OF_PROJECTS.extend(p for p in points if (p.group, p.name, p.value) not in known)
+    registered.cache_clear()
+
+
+def entries_of(table: str, points: Iterable[EntryPoint] | None = None) -> Iterator[Named]:
     """Yield every entry of the tables of a kind, in the order of the entry points.
+
+    Args:
+        table: what they are tables of.
+        points: the entry points; default: all that are installed or added.
 
     Raises:
         DikbenchError: if a module cannot be imported or has no table, or a name is none.
     """
     group = f"dikbench.{TABLES[table]}"
-    for entry_point in importlib.metadata.entry_points(group=group):
+    if points is None:
+        points = [*importlib.metadata.entry_points(group=group), *_OF_PROJECTS]
+    for entry_point in points:
+        if getattr(entry_point, "group", group) != group:
+            continue
         where = f"plug-in {entry_point.name!r} of {group}"
         try:
             module = _loaded(entry_point)
@@ -246,7 +275,10 @@ def entries_in(module: ModuleType, table: str, where: str, top: str) -> Iterator
         yield Named(name, value, home, at)
 
 
-def _loaded(entry_point: importlib.metadata.EntryPoint) -> Any:
+_OF_PROJECTS: list[EntryPoint] = []
+
+
+def _loaded(entry_point: EntryPoint) -> Any:
     """Load what an entry point names; what is installed beside dikbench comes first.
 
     A folder `formulations` or `scenarios` beside a user's script would hide those of dikbench.

@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from dikbench.cli.checking import check
+from dikbench.cli.new_command import new
 from dikbench.cli.one_line_errors import one_line_errors
 from dikbench.cli.reading_commands import compare, replay, table
 from dikbench.cli.reproducing_command import reproduce
@@ -286,6 +287,7 @@ def show(name: str, figure: Path | None, instance: int | None) -> None:
 
 commands.add_command(check)
 commands.add_command(compare)
+commands.add_command(new)
 commands.add_command(replay)
 commands.add_command(reproduce)
 commands.add_command(table)

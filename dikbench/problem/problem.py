@@ -111,6 +111,27 @@ class Solve(Protocol):
         """
         ...
 
+    def verify(
+        self,
+        program: QuadraticProgram,
+        x: Array,
+        y: Array | None = None,
+        z: Array | None = None,
+        z_box: Array | None = None,
+    ) -> None:
+        """Hand over a program that the formulation solved itself, to be rechecked like others.
+
+        It costs the formulation no time, and its answer counts as one that was claimed.
+
+        Args:
+            program: the program.
+            x: the answer.
+            y: multipliers of the equalities, where they are known (see `Answer`).
+            z: those of the inequalities.
+            z_box: those of the bounds.
+        """
+        ...
+
 
 @runtime_checkable
 class Formulation(Protocol):

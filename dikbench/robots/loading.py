@@ -141,9 +141,9 @@ def _named(name: str) -> Robot:
     """Make a robot of the catalogue, or of another author, from its entry."""
     entry = robot_entry(name)
     if name in ROBOTS:
-        return _of_entry(name, entry)
+        return robot_of_entry(name, entry)
     try:
-        return _of_entry(name.rpartition(":")[2], entry)
+        return robot_of_entry(name.rpartition(":")[2], entry)
     except MemoryError:
         raise
     except Exception as error:
@@ -151,7 +151,8 @@ def _named(name: str) -> Robot:
         raise DikbenchError(f"robot {name}: {said}") from error
 
 
-def _of_entry(name: str, entry: CatalogueEntry) -> Robot:
+def robot_of_entry(name: str, entry: CatalogueEntry) -> Robot:
+    """Make the robot of an entry, under a name."""
     model = entry.model()
     model.name = name
     limits = model_limits(model).with_interval("effort", None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import deepcopy
 from time import perf_counter_ns
 from typing import Any, Final
 
@@ -107,6 +108,23 @@ class CheckedSolve:
         error = self._reason(program)
         self.checking_ns += perf_counter_ns() - solved
         raise error
+
+    def verify(
+        self,
+        program: QuadraticProgram,
+        x: Array,
+        y: Array | None = None,
+        z: Array | None = None,
+        z_box: Array | None = None,
+    ) -> None:
+        """Recheck what the formulation solved itself (see `Solve.verify`)."""
+        if not self._checks:
+            return
+        start = perf_counter_ns()
+        # The formulation may write into its arrays before the recheck comes to them.
+        answer = Answer(np.array(x, dtype=float), claimed=True, y=y, z=z, z_box=z_box)
+        self._solved.append((self._step, deepcopy(program), deepcopy(answer)))
+        self.checking_ns += perf_counter_ns() - start
 
     def _reason(self, program: QuadraticProgram | ModelledProgram) -> Infeasible | SolverFailed:
         """Decide why there is no answer; the timing pass does not ask."""

@@ -35,7 +35,9 @@ def check_direction(formulation: Formulation | Asked, solver: str | None = None)
         robot = state.problem.robot.with_limits(acceleration=None)
         rows = list(robot.task_rows)
         at_rest = asked.velocity(posed(robot, state.problem.q, np.zeros(6)))
-        for _ in range(DIRECTIONS if at_rest is not None else 0):
+        if at_rest is None:
+            continue
+        for _ in range(DIRECTIONS):
             twist = np.zeros(6)
             twist[rows] = random.normal(size=len(rows))
             problem = posed(robot, state.problem.q, SLOW * twist / float(np.linalg.norm(twist)))

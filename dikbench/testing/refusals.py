@@ -21,7 +21,6 @@ APART_RAD_S: Final = 0.01
 
 ROWS_OF_THE_SECOND: Final = 2
 ROWS_OF_A_PART: Final = 2
-ROWS_OF_A_PART: Final = 2
 
 SLOWEST: Final = 1e-3
 """What is asked for at them is at least so fast [m/s, rad/s]."""
