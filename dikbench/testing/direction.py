@@ -10,7 +10,7 @@ from dikbench.problem.problem import Formulation
 from dikbench.testing.asked import Asked, asked_of
 from dikbench.testing.states import posed
 
-DIRECTIONS: Final = 2
+DIRECTIONS: Final = 4
 """Random twists at each configuration inside the limits."""
 
 SLOW: Final = 0.03
