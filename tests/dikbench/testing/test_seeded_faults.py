@@ -45,6 +45,10 @@ class Sound(Parameters):
 
 '''
 
+STRICT = (
+    "strict: ClassVar[bool] = True\n    sees: ClassVar[frozenset[str]] = frozenset({'lower-tasks'})"
+)
+
 STRIDE = 20
 """One state in so many is asked: eight, of every robot, at every speed, in and out of limits."""
 
@@ -58,7 +62,8 @@ FAULTS = {
     ),
     "infinity": (
         "finite",
-        "v = Sound.velocity(self, problem, solve); return v if problem.primary.V.any() else v + np.inf",
+        "v = Sound.velocity(self, problem, solve)\n"
+        "        return v if problem.primary.V.any() else v + np.inf",
     ),
     "infinity in one joint": (
         "finite",
@@ -83,7 +88,8 @@ FAULTS = {
     ),
     "writes into the limits": (
         "inputs untouched",
-        "problem.limits.joint.velocity.upper[0] *= 0.99; return Sound.velocity(self, problem, solve)",
+        "problem.limits.joint.velocity.upper[0] *= 0.99\n"
+        "        return Sound.velocity(self, problem, solve)",
     ),
     "writes into the model": (
         "inputs untouched",
@@ -229,8 +235,7 @@ FAULTS = {
     ),
     "an end of the range that gives no number": (
         "ranges",
-        "return Sound.velocity(self, problem, solve) * min(1.0, float(np.float64(1) / self.share) * 0 + 1)"
-        " if self.share else np.full(problem.robot.nv, np.nan)",
+        "v = Sound.velocity(self, problem, solve)\n        return v if self.share else v * np.nan",
         "share: Annotated[float, Range(0.0, 1.0)] = 0.5",
     ),
     "an end of the range at which it raises": (
@@ -257,7 +262,7 @@ FAULTS = {
         "        for task in problem.tasks[1:]:\n"
         "            v = v + 1e-3 * task.J.T @ task.V\n"
         "        return self.scaled(problem, v)",
-        'strict: ClassVar[bool] = True\n    sees: ClassVar[frozenset[str]] = frozenset({"lower-tasks"})',
+        STRICT,
     ),
     "a damped projector": (
         "priority",
@@ -266,14 +271,14 @@ FAULTS = {
         "        for task in problem.levels[1:]:\n"
         "            v = v + N @ (1e-2 * task.J.T @ task.V)\n"
         "        return self.scaled(problem, v)",
-        'strict: ClassVar[bool] = True\n    sees: ClassVar[frozenset[str]] = frozenset({"lower-tasks"})',
+        STRICT,
     ),
     "weights in place of priorities": (
         "priority",
         "J = np.vstack([0.1 ** (task.priority - 1) * task.J for task in problem.levels])\n"
         "        V = np.concatenate([0.1 ** (t.priority - 1) * t.V for t in problem.levels])\n"
         "        return self.scaled(problem, damped_least_squares(J, V, self.damping))",
-        'strict: ClassVar[bool] = True\n    sees: ClassVar[frozenset[str]] = frozenset({"lower-tasks"})',
+        STRICT,
     ),
     # 11. a warm start is misused
     "a descent that starts at the last answer": (
@@ -290,7 +295,8 @@ FAULTS = {
         "for q, V, v in NEAR:\n"
         "            task = problem.primary\n"
         "            if q.shape == problem.q.shape and V.shape == task.V.shape:\n"
-        "                if np.allclose(q, problem.q, atol=1e-3) and np.allclose(V, task.V, rtol=1e-3):\n"
+        "                near = np.allclose(q, problem.q, atol=1e-3)\n"
+        "                if near and np.allclose(V, task.V, rtol=1e-3):\n"
         "                    return v.copy()\n"
         "        v = Sound.velocity(self, problem, solve)\n"
         "        NEAR.append((problem.q.copy(), problem.primary.V.copy(), v.copy()))\n"
@@ -347,7 +353,8 @@ FAULTS = {
     "lower tasks that are seen and not declared": (
         "sight",
         "v = Sound.velocity(self, problem, solve)\n"
-        "        return self.scaled(problem, v + 1e-3 * sum(t.J.T @ t.V for t in problem.tasks[1:]))",
+        "        v = v + 1e-3 * sum(t.J.T @ t.V for t in problem.tasks[1:])\n"
+        "        return self.scaled(problem, v)",
     ),
 }
 """The check that names a fault, the body of `velocity`, and what stands before it in the class."""

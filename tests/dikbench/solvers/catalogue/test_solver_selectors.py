@@ -48,7 +48,7 @@ def test_our_own_settings_are_defaults_that_a_user_replaces() -> None:
 @pytest.mark.parametrize(
     ("selector", "message"),
     [
-        ("oqsp", r"unknown solver 'oqsp'; did you mean 'osqp'\? valid: clarabel, daqp"),
+        ("oqsp", r"unknown solver 'oqsp' .*; did you mean 'osqp'\? valid: clarabel, daqp"),
         ("", "not of the form"),
         ("osqp[eps=1e-6]", r"setting of solver osqp 'eps';.* valid: eps_abs, eps_rel, interface"),
         (
