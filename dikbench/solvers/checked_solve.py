@@ -141,8 +141,8 @@ class NoSolve(CheckedSolve):
 
     __slots__ = ()
 
-    def __init__(self) -> None:
-        super().__init__(_refuse)
+    def __init__(self, *, checks: bool = True) -> None:
+        super().__init__(_refuse, checks=checks)
 
 
 def _refuse(program: object, site: int) -> Answer:
@@ -163,7 +163,7 @@ def make_solve(
             change the caches.
     """
     if solver is None or program is None:
-        return NoSolve()
+        return NoSolve(checks=checks)
     back_end = _back_end(solver, program)
     if solver.then is not None:
         back_end = _InTurn(back_end, _back_end(solver.then, program))

@@ -124,7 +124,9 @@ def check_robot_repeatable(entry: CatalogueEntry) -> None:
 
 def _loaded(entry: CatalogueEntry) -> Robot:
     try:
-        return robot_of_entry("robot", entry)
+        robot = robot_of_entry("robot", entry)
+        _ = robot.chain  # which looks its frame up
+        return robot
     except DikbenchError as error:
         raise CannotCheck(str(error), str(error)) from error
     except Exception as error:

@@ -211,8 +211,11 @@ def test_list_and_show_say_where_a_plug_in_is_from(install: Install, mine: str) 
         assert mine in done.output
 
 
-def test_a_study_names_them_and_keeps_their_rows(mine: str, tmp_path: Path) -> None:
+def test_a_study_names_them_and_keeps_their_rows(
+    mine: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """In workers; with the metric in the table; a second run finds all done; recompute knows it."""
+    monkeypatch.setattr("dikbench.report.write.write_report", lambda folder: "")
     study = tmp_path / "study.toml"
     study.write_text(
         'description = "mine"\n'
