@@ -3,8 +3,9 @@
 A study crosses formulations with scenarios, solvers and seeds into trials; a trial is simulated
 into a trace; metrics read the trace; results keep one row per trial; the report reads the results.
 
-Authors import from `dikbench.problem` for a formulation, `dikbench.scenario` for a family,
-`dikbench.metrics` for a metric and `dikbench.testing` for the contract.
+Authors import from `dikbench.problem` for a formulation, `dikbench.scenario` for a family or a
+plant, `dikbench.metrics` for a metric, `dikbench.solvers` for a solver, `dikbench.robots` for a
+robot and `dikbench.testing` for the contracts.
 """
 
 from __future__ import annotations
@@ -63,7 +64,7 @@ _HOME: Final = {
     "simulation.status": ("Status",),
 }
 
-_DOORS: Final = ("metrics", "problem", "scenario", "testing")
+_DOORS: Final = ("metrics", "problem", "robots", "scenario", "solvers", "testing")
 
 __all__ = [
     "BoxObstacle",

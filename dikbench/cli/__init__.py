@@ -5,16 +5,17 @@ from __future__ import annotations
 import shlex
 import signal
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
 
 from dikbench.cli.checking import check
+from dikbench.cli.new_command import new
 from dikbench.cli.one_line_errors import one_line_errors
 from dikbench.cli.reading_commands import compare, replay, table
 from dikbench.cli.reproducing_command import reproduce
+from dikbench.cli.study_options import JOBS_OPTION, METRIC_OPTION, study_options
 from dikbench.cli.tuning_command import tune
 
 EXIT_CODE_OF_STANDSTILL = 3
@@ -54,61 +55,6 @@ def commands() -> None:
     A selector is a name, with parameters if needed: 'dls[damping=0.1]',
     'near-miss[robot=ur5,miss=0.02]', 'osqp[eps_abs=1e-6]'.
     """
-
-
-def _axis(name: str, help: str, **settings: Any) -> Callable[..., Any]:
-    """Make the option that replaces an axis of a study; it may be repeated."""
-    return click.option(f"--{name}", f"{name}s", multiple=True, help=help, **settings)
-
-
-STUDY_OPTIONS = (
-    click.argument("study", required=False),
-    _axis(
-        "formulation",
-        "A formulation, path/to/file.py:Class, or oracle; 'dls[damping=0.01|0.1]' is two.",
-        metavar="SELECTOR",
-    ),
-    _axis("scenario", "A scenario; repeat for more.", metavar="SELECTOR"),
-    _axis(
-        "solver", "A solver, for formulations that need one; repeat for more.", metavar="SELECTOR"
-    ),
-    _axis(
-        "seed",
-        "A seed of the scenarios; 0 perturbs nothing; repeat for more.",
-        type=click.IntRange(min=0),
-        metavar="N",
-    ),
-    _axis(
-        "plant",
-        "ideal, protective or saturating, with noise and delay: 'ideal[noise=1e-4,delay=2]'.",
-        metavar="SELECTOR",
-    ),
-    _axis(
-        "reference",
-        "What advances the reference: the clock, or the progress achieved.",
-        type=click.Choice(["time", "path"]),
-    ),
-    click.option(
-        "--out",
-        type=click.Path(path_type=Path, file_okay=False),
-        metavar="DIR",
-        help="Results folder; default: runs/STUDY, without STUDY one for each selection.",
-    ),
-)
-
-JOBS_OPTION = click.option(
-    "--jobs",
-    type=click.IntRange(min=1),
-    metavar="N",
-    help="Worker processes; default: one per core.",
-)
-
-
-def study_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the options that select a study, its axes and its results folder."""
-    for option in reversed(STUDY_OPTIONS):
-        command = option(command)
-    return command
 
 
 def _selected(study: str | None, axes: dict[str, Any], out: Path | None) -> tuple[Any, Path]:
@@ -256,9 +202,10 @@ def report(folder: Path) -> None:
 
 @commands.command()
 @click.argument("folder", type=click.Path(path_type=Path, file_okay=False))
+@METRIC_OPTION
 @JOBS_OPTION
 @one_line_errors
-def recompute(folder: Path, jobs: int | None) -> None:
+def recompute(folder: Path, metrics: tuple[str, ...], jobs: int | None) -> None:
     """Compute all metrics of a results folder again from its traces, without running a formulation.
 
     For metrics that are new or have changed since the run. Trials without a trace keep their
@@ -270,7 +217,7 @@ def recompute(folder: Path, jobs: int | None) -> None:
 
     command = shlex.join(["dikbench", *sys.argv[1:]])
     try:
-        done = recompute_results(folder, jobs or available_cores(), command)
+        done = recompute_results(folder, jobs or available_cores(), command, metrics)
     except Interrupted as stopped:
         click.echo(f"\nstopped: {stopped}; to continue: {command}", err=True)
         sys.exit(130)
@@ -340,6 +287,7 @@ def show(name: str, figure: Path | None, instance: int | None) -> None:
 
 commands.add_command(check)
 commands.add_command(compare)
+commands.add_command(new)
 commands.add_command(replay)
 commands.add_command(reproduce)
 commands.add_command(table)

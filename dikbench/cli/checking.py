@@ -5,11 +5,14 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import click
 
 from dikbench.cli.one_line_errors import one_line_errors
+
+if TYPE_CHECKING:
+    from dikbench.testing.verdicts import Verdict
 
 MOST_PLACES: Final = 5
 """At most so many places are named where a study breaks an invariant."""
@@ -46,9 +49,11 @@ Line = tuple[str, str, str]
 def check(
     name: str | None, solver: str | None, benchmark: str | None, out: Path | None, jobs: int | None
 ) -> None:
-    """Print which promises a formulation or a scenario family keeps, a line for each check.
+    """Print which promises a plug-in keeps, a line for each check.
 
-    SELECTOR is a name with parameters where wanted, or 'path/to/file.py:Class[...]'. The exit code
+    SELECTOR is the name of a formulation, scenario family, solver, plant, robot or metric, with
+    parameters where wanted, or 'path/to/file.py:Class[...]'; without a class it is every plug-in
+    of the file, and a folder with a pyproject.toml is every plug-in of that project. The exit code
     is 1 where a promise is broken.
 
     With --benchmark it is a study that is checked: straw laws, which stand still, creep, shake or
@@ -56,12 +61,38 @@ def check(
     """
     if (name is None) == (benchmark is None):
         raise click.UsageError("give a SELECTOR, or --benchmark STUDY")
-    lines = _of_plugin(name, solver) if name else _of_study(str(benchmark), out, jobs)
-    broken = False
+    if name is None:
+        sys.exit(_echo(_of_study(str(benchmark), out, jobs)))
+    from dikbench.cli.checked import subjects
+
+    broken, several = 0, False
+    for title, verdicts in subjects(name, solver):
+        if title:
+            click.echo(f"{chr(10) if several else ''}{title}:")
+            several = True
+        broken |= _echo(_lines(verdicts))
+    sys.exit(broken)
+
+
+def _echo(lines: Iterator[Line]) -> int:
+    """Print a line for each check; return 1 where one is broken, else 0."""
+    broken = 0
     for outcome, what, reason in lines:
         click.echo(f"{outcome:<12}  {what}{f': {reason}' if reason else ''}")
         broken |= outcome == "BROKEN"
-    sys.exit(1 if broken else 0)
+    return broken
+
+
+def _lines(verdicts: Iterator[Verdict]) -> Iterator[Line]:
+    """Yield a line for each verdict, and one for all checks that a cause keeps from being made."""
+    unchecked: dict[str, list[str]] = {}
+    for verdict in verdicts:
+        if verdict.outcome == "not checked":
+            unchecked.setdefault(verdict.reason, []).append(verdict.check)
+        else:
+            yield verdict.outcome, verdict.check, verdict.reason
+    for reason, checks in unchecked.items():
+        yield "not checked", ", ".join(checks), reason
 
 
 def _of_study(benchmark: str, out: Path | None, jobs: int | None) -> Iterator[Line]:
@@ -84,38 +115,3 @@ def _of_study(benchmark: str, out: Path | None, jobs: int | None) -> Iterator[Li
             yield "BROKEN", checked.sentence, place
         if len(checked.broken) > MOST_PLACES:
             yield "BROKEN", checked.sentence, f"and {len(checked.broken) - MOST_PLACES} more"
-
-
-def _of_plugin(name: str, solver: str | None) -> Iterator[Line]:
-    """Yield a line for each check of a plug-in's contract."""
-    from dikbench.errors import DikbenchError, unknown
-    from dikbench.plugins.building import make_family, make_formulation
-    from dikbench.plugins.finding import formulations_and_peers, in_file, kind_in_file, plugins
-    from dikbench.problem.problem import not_installed
-    from dikbench.selector import parse_selector
-    from dikbench.testing.verdicts import verdicts_on_family, verdicts_on_formulation
-
-    plugin = parse_selector(name).name
-    known = {plugin: kind_in_file(plugin)} if in_file(plugin) else {}
-    known |= dict.fromkeys(formulations_and_peers(), "formulation")
-    known |= dict.fromkeys(plugins("scenario"), "scenario")
-    if plugin not in known:
-        where = "(or give path/to/file.py:Class)"
-        raise unknown("formulation or scenario", plugin, known, where, "dikbench list")
-    if known[plugin] == "formulation":
-        formulation = make_formulation(name)
-        if missing := not_installed(formulation):
-            raise DikbenchError(f"formulation {name}: {missing}")
-        verdicts = verdicts_on_formulation(formulation, solver)
-    elif solver is not None:
-        raise DikbenchError(f"--solver {solver}: {name} is a scenario family, which needs none")
-    else:
-        verdicts = verdicts_on_family(make_family(name))
-    unchecked: dict[str, list[str]] = {}
-    for verdict in verdicts:
-        if verdict.outcome == "not checked":
-            unchecked.setdefault(verdict.reason, []).append(verdict.check)
-        else:
-            yield verdict.outcome, verdict.check, verdict.reason
-    for reason, checks in unchecked.items():
-        yield "not checked", ", ".join(checks), reason

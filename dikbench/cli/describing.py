@@ -10,33 +10,35 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
-from dikbench.cli.listing import ORACLE_SUMMARIES, direction, plant_plugin
+from dikbench.annotations import type_in_words
+from dikbench.cli.kinds import kind_named
+from dikbench.cli.listing import ORACLE_SUMMARIES, direction
 from dikbench.cli.robot_in_words import ROBOT_FILES, robot_in_words
 from dikbench.errors import DikbenchError, unknown
-from dikbench.metrics import METRICS, OUTCOME_SENTENCES, Outcome
+from dikbench.metrics import EVERY_METRIC, OUTCOME_SENTENCES, Metric, Outcome, other_metrics
 from dikbench.plugins.building import make_formulation, make_plant, make_scenario
 from dikbench.plugins.finding import (
     Plugin,
     formulation_plugin,
     formulations_and_peers,
-    in_file,
-    kind_in_file,
+    plant_plugin,
     plugins,
     scenario_plugin,
 )
 from dikbench.report.tables.every import tables_with
-from dikbench.robots.catalogue import ROBOTS
+from dikbench.robots.plugged import EVERY_ROBOT
 from dikbench.scenario.oracle import ORACLES
-from dikbench.scenario.plant import PLANTS, REFERENCE_MODES
+from dikbench.scenario.plant import REFERENCE_MODES
 from dikbench.scenario.scenario import Scenario
 from dikbench.selector import Selector, listed, parse_selector
 from dikbench.solvers.catalogue.back_ends import (
-    BACK_ENDS,
     DEFAULT_SOLVER,
+    SOLVERS,
+    find_back_end,
     is_installed,
     parse_solver,
+    presets_of,
 )
-from dikbench.solvers.catalogue.presets import TOLERANCES
 from dikbench.study.instances import draw_instance
 from dikbench.study.study import load_study, shipped_studies
 
@@ -59,19 +61,19 @@ def description(text: str) -> str:
     """
     selector = parse_selector(text)
     name = selector.name
-    kind = kind_in_file(name) if in_file(name) else None
-    if kind == "formulation" or name in formulations_and_peers():
+    kind = kind_named(name)
+    if kind == "formulation":
         return _described(formulation_plugin(name), selector)
-    if kind == "scenario" or name in plugins("scenario"):
+    if kind == "scenario":
         return _described(scenario_plugin(name), selector, scenario=True)
-    if name in BACK_ENDS:
+    if kind == "solver":
         return _solver(selector)
-    if name in PLANTS:
+    if kind == "plant":
         make_plant(selector)
         return _plugin(plant_plugin(name), selector, "")
-    if name in ROBOTS or name.endswith(ROBOT_FILES):
+    if kind == "robot" or name.endswith(ROBOT_FILES):
         return robot_in_words(name, selector.parameters)
-    described = _without_parameters(name)
+    described = _metric(name) if kind == "metric" else _without_parameters(name)
     if selector.parameters:
         raise DikbenchError(
             f"{text}: {name} has no parameters; valid in brackets: those of a formulation, "
@@ -106,8 +108,6 @@ def drawn_instance(text: str, number: int) -> str:
 def _without_parameters(name: str) -> str:
     if name in ORACLES:
         return f"{name}: {ORACLE_SUMMARIES[name]}"
-    if name in METRICS:
-        return _metric(name)
     if name in {outcome.value for outcome in Outcome}:
         return f"{name}: {OUTCOME_SENTENCES[Outcome(name)]}"
     if name in shipped_studies() or name.endswith(".toml"):
@@ -117,10 +117,10 @@ def _without_parameters(name: str) -> str:
     every = [
         *formulations_and_peers(),
         *plugins("scenario"),
-        *BACK_ENDS,
-        *PLANTS,
-        *ROBOTS,
-        *METRICS,
+        *SOLVERS.names(),
+        *plugins("plant"),
+        *EVERY_ROBOT.names(),
+        *EVERY_METRIC.names(),
     ]
     raise unknown("name", name, [*every, *shipped_studies()], every="dikbench list")
 
@@ -229,15 +229,19 @@ def _meanings(of: str, words: Mapping[str, str]) -> list[str]:
 
 
 def _solver(selector: Selector) -> str:
-    name, entry = selector.name, BACK_ENDS[selector.name]
+    name, entry = selector.name, find_back_end(selector.name)
     if selector.parameters:
         parse_solver(selector)
-    presets = ", ".join(f"{preset} {tolerance:g}" for preset, tolerance in TOLERANCES.items())
-    settings = ", ".join(f"{key} ({kind.__name__})" for key, kind in entry.settings.items())
+    known = presets_of(entry)
+    presets = ", ".join(f"{preset} {tolerance:g}" for preset, tolerance in known.items())
+    settings = ", ".join(f"{key} ({type_in_words(kind)})" for key, kind in entry.settings.items())
     return "\n".join(
         [
             f"{name}: {entry.summary}",
-            f"  package: {entry.package}, {'installed' if is_installed(name) else 'missing'}",
+            *([] if entry.found is None else [f"  file: {entry.found.file}"]),
+            f"  package: {entry.package}, {'installed' if is_installed(name) else 'missing'}"
+            if entry.package
+            else "  package: none is named",
             f"  interfaces: {', '.join(entry.interfaces)} (the first is the default)",
             f"  linear programs: {entry.no_lp or 'yes'}",
             f"  presets: {presets} (largest residual of a verified answer)",
@@ -254,11 +258,18 @@ def _solver(selector: Selector) -> str:
 
 
 def _metric(name: str) -> str:
-    metric = METRICS[name]
-    tables = ", ".join(tables_with(name))
+    found = EVERY_METRIC.find(name)
+    if found is None:
+        return _described_metric(EVERY_METRIC.shipped[name])
+    others = [_described_metric(metric) for metric, _, _ in other_metrics([name])]
+    return "\n\n".join(f"{each}\n  file: {found.file}" for each in others)
+
+
+def _described_metric(metric: Metric) -> str:
+    tables = ", ".join(tables_with(metric.name))
     return "\n".join(
         [
-            f"{name}: {metric.definition}",
+            f"{metric.name}: {metric.definition}",
             f"  unit: {metric.unit or 'none'}; {direction(metric)}; worst value {metric.worst}",
             f"  tables: {tables or 'none; a column of trials.csv'}",
             f"  source: {metric.source.strip('[]')}",

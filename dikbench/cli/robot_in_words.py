@@ -11,11 +11,12 @@ import numpy as np
 
 from dikbench.arrays import Array
 from dikbench.errors import unknown
-from dikbench.robots.catalogue import ROBOTS
 from dikbench.robots.limits import Interval
 from dikbench.robots.loading import load_robot
+from dikbench.robots.plugged import EVERY_ROBOT, robot_entry
 from dikbench.robots.robot import Robot
 from dikbench.robots.task_rows import rows_in_words
+from dikbench.user_code import in_file
 
 ROBOT_FILES: Final = (".urdf", ".xml", ".xacro")
 """How the name of a robot's file ends."""
@@ -41,9 +42,12 @@ def robot_in_words(name_or_urdf: str, options: Mapping[str, str]) -> str:
         if name not in OPTIONS:
             raise unknown(f"parameter of robot {name_or_urdf}", name, OPTIONS)
     given: dict[str, Any] = dict(options)
-    if name_or_urdf in ROBOTS:
-        robot, entry = load_robot(name_or_urdf, **given), ROBOTS[name_or_urdf]
+    if in_file(name_or_urdf) or name_or_urdf in EVERY_ROBOT:
+        entry = robot_entry(name_or_urdf)
+        robot = load_robot(name_or_urdf, **given)
         head = [f"{name_or_urdf}: {entry.summary}", f"  task frame: {robot.frame}"]
+        if (found := EVERY_ROBOT.find(name_or_urdf)) is not None:
+            head.append(f"  file: {found.file}")
         source = entry.acceleration_source
     else:
         given.setdefault("frame", _last_moved_link(name_or_urdf))

@@ -39,6 +39,7 @@ def run_study(
     seeds: int | Iterable[int] = (),
     plants: Selectors = (),
     references: Selectors = (),
+    metrics: Selectors = (),
     instances: int = 0,
     fraction: float = 1.0,
     out: str | Path | None = None,
@@ -70,6 +71,7 @@ def run_study(
         solvers: the same.
         seeds: seeds of the scenarios that replace those of the study.
         plants: selectors that replace those of the study.
+        metrics: metrics of yours, as `path/to/file.py:NAME`, beside those of dikbench.
         references: `time` or `path`: what advances the reference.
         instances: number of random instances of each scenario that are drawn, in place of seeds; 0:
             the study's own.
@@ -105,6 +107,7 @@ def run_study(
         seeds=_seeds(seeds),
         plants=_texts("plants", plants),
         references=_texts("references", references),
+        metrics=_texts("metrics", metrics),
         instances=instances,
         fraction=fraction,
     )

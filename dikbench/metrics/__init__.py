@@ -20,10 +20,19 @@ from dikbench.metrics.outcome import (
     Outcome,
     Verdict,
 )
+from dikbench.metrics.plugged import (
+    EVERY_METRIC,
+    OtherMetric,
+    described,
+    evaluate_others,
+    other_metrics,
+    take_errors,
+)
 from dikbench.metrics.reductions import REDUCTIONS
 from dikbench.metrics.violation import VIOLATION_TOLERANCE
 
 __all__ = [
+    "EVERY_METRIC",
     "METRICS",
     "OUTCOME_NUMBERS",
     "OUTCOME_SENTENCES",
@@ -34,12 +43,17 @@ __all__ = [
     "Measured",
     "Metric",
     "Motion",
+    "OtherMetric",
     "Outcome",
     "Verdict",
+    "described",
     "evaluate",
+    "evaluate_others",
     "judge",
     "measure",
     "motion_of",
+    "other_metrics",
     "outcome_columns",
     "series_metrics",
+    "take_errors",
 ]

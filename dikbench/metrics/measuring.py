@@ -10,6 +10,7 @@ from dikbench.metrics.every import evaluate
 from dikbench.metrics.judging import outcome_columns
 from dikbench.metrics.motion import Motion, is_finite
 from dikbench.metrics.motion_of_trace import motion_of, motions_of
+from dikbench.metrics.plugged import OtherMetric, evaluate_others
 from dikbench.scenario.scenario import Scenario
 from dikbench.simulation.status import Status
 from dikbench.simulation.trace import Trace
@@ -34,10 +35,11 @@ class Measured(NamedTuple):
     status: Status
 
 
-def measure(runs: Sequence[Measured]) -> list[dict[str, Any]]:
+def measure(runs: Sequence[Measured], others: Sequence[OtherMetric] = ()) -> list[dict[str, Any]]:
     """Compute every metric and the columns of the outcome of each run; none of one without steps.
 
-    They do not depend on what else is measured, to the bit.
+    They do not depend on what else is measured, to the bit. Metrics of other authors are computed
+    in addition (see `evaluate_others`).
 
     Raises:
         DikbenchError: if a trace is not one of its scenario's robot.
@@ -46,7 +48,11 @@ def measure(runs: Sequence[Measured]) -> list[dict[str, Any]]:
     for numbers in _together(runs):
         part = [runs[number] for number in numbers]
         for number, run, motion in zip(numbers, part, _motions(part), strict=True):
-            found[number] = {**evaluate(motion), **outcome_columns(motion, run.status)}
+            found[number] = {
+                **evaluate(motion),
+                **evaluate_others(motion, others),
+                **outcome_columns(motion, run.status),
+            }
     return found
 
 

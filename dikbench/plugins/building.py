@@ -10,14 +10,14 @@ import msgspec
 
 from dikbench.errors import DikbenchError, in_words, unknown
 from dikbench.parameters import Parameter, check_parameters, parameters_of
-from dikbench.plugins.finding import formulation_plugin, scenario_plugin
+from dikbench.plugins.finding import formulation_plugin, plant_plugin, scenario_plugin
 from dikbench.plugins.time_limit import time_limit
 from dikbench.plugins.tuned import with_tuned
 from dikbench.problem.problem import Formulation
 from dikbench.scenario.certificate import CertificateFailed
 from dikbench.scenario.family import Family
 from dikbench.scenario.misfits import misfits
-from dikbench.scenario.plant import PLANTS, Plant
+from dikbench.scenario.plant import Plant
 from dikbench.scenario.scenario import Scenario
 from dikbench.selector import Selector, parse_selector
 
@@ -80,16 +80,15 @@ def make_scenario(text: str | Selector, seed: int = 0) -> Scenario:
 
 
 def make_plant(text: str | Selector) -> Plant:
-    """Build a plant from `ideal[noise=...,delay=...]` or `saturating[...]`.
+    """Build a plant from `ideal[noise=...,delay=...]` or `path/to/file.py:Class[...]`.
 
     Raises:
-        DikbenchError: on an unknown name or parameter, or a value out of range.
+        DikbenchError: on an unknown name, file, class or parameter, or a value out of range.
     """
     selector = parse_selector(text)
-    if selector.name not in PLANTS:
-        raise unknown("plant", selector.name, PLANTS)
-    plant = PLANTS[selector.name]
-    return _built(f"plant {selector.name}", plant, parameters_of(plant), selector)
+    plugin = plant_plugin(selector.name)
+    make: Callable[..., Plant] = partial(plugin.factory, **plugin.defaults)
+    return _built(f"plant {plugin.name}", make, plugin.parameters, selector)
 
 
 def scenario_parameters(text: str | Selector) -> Mapping[str, Any]:
@@ -134,11 +133,13 @@ def in_declared_order(
     try:
         if kind == "formulation":
             selector = with_tuned(selector)
-        if kind == "plant":
-            return selector.ordered(parameters_of(PLANTS[selector.name]))
-        find = formulation_plugin if kind == "formulation" else scenario_plugin
+        find = {
+            "formulation": formulation_plugin,
+            "scenario": scenario_plugin,
+            "plant": plant_plugin,
+        }[kind]
         return selector.ordered(find(selector.name).parameters)
-    except (DikbenchError, KeyError):
+    except DikbenchError:
         return selector
 
 

@@ -1,33 +1,41 @@
-"""Formulations and scenario families, found through entry points or in a file.
+"""Formulations, scenario families and plants, found through entry points or in a file.
 
-An entry point in the group `dikbench.formulations` or `dikbench.scenarios` names a module that
-has a table `FORMULATIONS` or `SCENARIOS`: name -> class, an instance of a class (whose values
-are then the defaults), or a `functools.partial` of one. A module of formulations may have a table
-`PEERS` as well, of other libraries as formulations: they are found by name, and are not among "all
-formulations", which do not depend on what is installed.
+An entry of a table `FORMULATIONS`, `SCENARIOS` or `PLANTS` (see `dikbench.user_code`) is a class,
+an instance of a class (whose values are then the defaults), or a `functools.partial` of one. A
+module of formulations may have a table `PEERS` as well, of other libraries as formulations: they
+are found by name, and are not among "all formulations", which do not depend on what is installed.
 """
 
 from __future__ import annotations
 
-import importlib.metadata
-import importlib.util
 import inspect
-import os.path
-import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cached_property, lru_cache, partial
-from pathlib import Path
-from types import MappingProxyType, ModuleType
+from types import MappingProxyType
 from typing import Any, Final, Literal
 
-from dikbench.errors import DikbenchError, in_words, unknown
+from dikbench.errors import DikbenchError, unknown
 from dikbench.parameters import Parameter, parameters_of
 from dikbench.scenario.family import Family
+from dikbench.scenario.plant import PLANTS, Plant
 from dikbench.selector import TUNED
+from dikbench.user_code import Named, entries_of, in_file, named_in_file
 
-Kind = Literal["formulation", "scenario"]
-Table = Literal["formulation", "scenario", "peer"]
+__all__ = [
+    "Kind",
+    "Plugin",
+    "Table",
+    "formulation_plugin",
+    "formulations_and_peers",
+    "in_file",
+    "plant_plugin",
+    "plugins",
+    "scenario_plugin",
+]
+
+Kind = Literal["formulation", "scenario", "plant"]
+Table = Literal["formulation", "scenario", "peer", "plant"]
 
 RESERVED: Final[Mapping[Kind, tuple[str, str]]] = MappingProxyType(
     {
@@ -40,7 +48,7 @@ RESERVED: Final[Mapping[Kind, tuple[str, str]]] = MappingProxyType(
 
 @dataclass(frozen=True)
 class Plugin:
-    """A formulation or a scenario family as it was registered.
+    """A formulation, a scenario family or a plant as it was registered.
 
     Attributes:
         name: the name in the table.
@@ -78,6 +86,24 @@ class Plugin:
         }
 
 
+METHOD: Final[Mapping[Kind, str]] = MappingProxyType(
+    {
+        "formulation": "velocity(problem, solve)",
+        "scenario": "case(robot, change)",
+        "plant": "drive(v, v_before, limits, dt)",
+    }
+)
+"""What a plug-in of each kind must define."""
+
+MISFIT: Final[Mapping[Kind, str]] = MappingProxyType(
+    {
+        "formulation": "has no method velocity(problem, solve)",
+        "scenario": "is not derived from dikbench.scenario.Family",
+        "plant": "is not derived from dikbench.scenario.Plant",
+    }
+)
+
+
 def formulations_and_peers() -> Mapping[str, Plugin]:
     """Find every registered formulation and every peer, by name."""
     return {**plugins("formulation"), **plugins("peer")}
@@ -91,32 +117,16 @@ def plugins(kind: Table) -> Mapping[str, Plugin]:
         DikbenchError: if there is none (dikbench is not installed), a module has no table, an entry
             is not a plug-in, or two have the same name.
     """
-    group = f"dikbench.{'formulation' if kind == 'peer' else kind}s"
     found: dict[str, Plugin] = {}
-    for entry_point in importlib.metadata.entry_points(group=group):
-        where = f"plug-in {entry_point.name!r} of {group}"
-        try:
-            module = _loaded(entry_point)
-        except Exception as error:
+    if kind == "plant":
+        found = {name: _registered("plant", _shipped(name)) for name in PLANTS}
+    for entry in entries_of(kind):
+        plugin = _registered("formulation" if kind == "peer" else kind, entry)
+        if found.setdefault(plugin.name, plugin) != plugin:
             raise DikbenchError(
-                f"{where} ({entry_point.value}) cannot be imported: {in_words(error)}"
-            ) from error
-        file = getattr(module, "__file__", None) or repr(module)
-        table = getattr(module, f"{kind.upper()}S", {} if kind == "peer" else None)
-        if not isinstance(table, Mapping):
-            top = entry_point.value.partition(".")[0]
-            raise DikbenchError(
-                f"{where}: {file} holds no mapping {kind.upper()}S; if it is not the plug-in's, a "
-                f"folder or module {top!r} of yours hides it: valid: another name"
+                f"two plug-ins are called {entry.name!r}: {found[entry.name].file} and "
+                f"{plugin.file}"
             )
-        for name, entry in table.items():
-            plugin = _registered(
-                "scenario" if kind == "scenario" else "formulation", name, entry, file
-            )
-            if found.setdefault(plugin.name, plugin) != plugin:
-                raise DikbenchError(
-                    f"two plug-ins are called {name!r}: {found[name].file} and {plugin.file}"
-                )
     if not found and kind != "peer":
         raise DikbenchError(
             f"no {kind}s are registered: dikbench is not installed here; "
@@ -125,17 +135,9 @@ def plugins(kind: Table) -> Mapping[str, Plugin]:
     return found
 
 
-def _loaded(entry_point: importlib.metadata.EntryPoint) -> Any:
-    """Load what an entry point names; what is installed beside dikbench comes first.
-
-    A folder `formulations` or `scenarios` beside a user's script would hide those of dikbench.
-    """
-    beside = str(Path(__file__).parents[2])
-    sys.path.insert(0, beside)
-    try:
-        return entry_point.load()
-    finally:
-        sys.path.remove(beside)
+def _shipped(name: str) -> Named:
+    plant = PLANTS[name]
+    return Named(name, plant, plant.__module__, inspect.getsourcefile(plant) or "")
 
 
 def formulation_plugin(name: str) -> Plugin:
@@ -148,123 +150,72 @@ def scenario_plugin(name: str) -> Plugin:
     return _plugin("scenario", name)
 
 
-def in_file(name: str) -> bool:
-    """Say whether a selector's name has the form `path/to/file.py:Class`, or lacks the class."""
-    return name.rpartition(":")[0].endswith(".py") or name.endswith(".py")
+def plant_plugin(name: str) -> Plugin:
+    """Find the plug-in behind a plant's name or `path/to/file.py:Class`."""
+    return _plugin("plant", name)
 
 
-def _file_and_class(name: str) -> tuple[str, str]:
-    """Split `path/to/file.py:Class`.
-
-    Raises:
-        DikbenchError: if there is no class; the message names those of the file.
-    """
-    if not name.endswith(".py"):
-        path, _, class_name = name.rpartition(":")
-        return path, class_name
-    own = [
-        value
-        for value in _own_classes(_module_from_file(name))
-        if issubclass(value, Family) or callable(getattr(value, "velocity", None))
-    ]
-    valid = ", ".join(f"{name}:{value.__name__}" for value in own)
-    raise DikbenchError(
-        f"{name} names a file without a class; valid: "
-        f"{valid or 'none, for it holds no formulation and no family'}"
-    )
+IS: Final[Mapping[Kind, Callable[[Any], bool]]] = MappingProxyType(
+    {
+        "formulation": lambda value: callable(getattr(value, "velocity", None)),
+        "scenario": lambda value: isinstance(value, type) and issubclass(value, Family),
+        "plant": lambda value: isinstance(value, type) and issubclass(value, Plant),
+    }
+)
+"""Says whether what a file defines is of a kind."""
 
 
-def kind_in_file(name: str) -> Kind:
-    """Say whether a class in a user's file is a formulation or a family."""
-    found = _class_from_file(*_file_and_class(name))
-    return "scenario" if issubclass(found, Family) else "formulation"
+def kind_of(value: Any) -> Kind | None:
+    """Say which of these kinds of plug-in something is; None where it is neither."""
+    return next((kind for kind in ("scenario", "plant", "formulation") if IS[kind](value)), None)
 
 
 def _plugin(kind: Kind, name: str) -> Plugin:
     if in_file(name):
-        path, class_name = _file_and_class(name)
-        found = _class_from_file(path, class_name)
-        plugin = _registered(kind, class_name, found, path)
-        if found.__module__ != _module_from_file(path).__name__:  # it is imported there
-            return plugin
-        # Another file of this name, in another folder, may have taken the module's place.
-        return replace(plugin, file=os.path.abspath(path))
-    known = plugins(kind) if kind == "scenario" else formulations_and_peers()
+        fits: Callable[[Any], bool] = lambda value: kind_of(value) is not None  # noqa: E731
+        nothing = "no formulation, no family and no plant"
+        entry = named_in_file(name, fits, nothing)
+        return _registered(kind, replace(entry, name=name.rpartition(":")[2]))
+    known = formulations_and_peers() if kind == "formulation" else plugins(kind)
     if name not in known:
         where = "(or give path/to/file.py:Class)"
         raise unknown(kind, name, known, where, f"dikbench list {kind}s")
     return known[name]
 
 
-def _registered(kind: Kind, name: object, entry: Any, file: str) -> Plugin:
+def _registered(kind: Kind, named: Named) -> Plugin:
     """Check an entry of a table, or a class of a file, and describe it as a plug-in."""
-    if not isinstance(name, str) or not name or set(name) & set("[],= \t\n"):
-        raise DikbenchError(f"{file}: {name!r} is not a name (no brackets, commas or spaces)")
-    factory, defaults = entry, {}
-    if isinstance(entry, partial):
-        factory = entry.func
-    elif is_dataclass(entry) and not isinstance(entry, type):
-        factory = type(entry)
-        defaults = {own.name: getattr(entry, own.name) for own in fields(entry) if own.init}
-    where = f"{file}: {kind} {name!r}"
+    factory, defaults = named.value, {}
+    if isinstance(factory, partial):
+        factory = factory.func
+    elif is_dataclass(factory) and not isinstance(factory, type):
+        defaults = {own.name: getattr(factory, own.name) for own in fields(factory) if own.init}
+        factory = type(factory)
+    where = f"{named.file}: {kind} {named.name!r}"
     if not isinstance(factory, type):
         raise DikbenchError(f"{where} is no class, nor an instance of one")
-    if kind == "formulation" and not callable(getattr(factory, "velocity", None)):
-        raise DikbenchError(f"{where} has no method velocity(problem, solve)")
-    if kind == "scenario" and not issubclass(factory, Family):
-        raise DikbenchError(f"{where} is not derived from dikbench.scenario.Family")
-    if kind == "scenario" and inspect.isabstract(factory):
-        raise DikbenchError(f"{where} has no method case(robot, change)")
+    if not IS[kind](factory):
+        raise DikbenchError(f"{where} {MISFIT[kind]}")
+    if inspect.isabstract(factory):
+        raise DikbenchError(f"{where} has no method {METHOD[kind]}")
     if not is_dataclass(factory):
-        raise DikbenchError(f"{where}: write @dataclass(frozen=True) above class {name}")
+        raise DikbenchError(f"{where}: write @dataclass(frozen=True) above class {named.name}")
     try:
         parameters = parameters_of(factory)
     except DikbenchError as error:
         raise DikbenchError(f"{where}: {error}") from None
-    reserved, instead = RESERVED[kind]
+    reserved, instead = RESERVED.get(kind, ("", ""))
     if reserved in parameters:
         raise DikbenchError(
             f"{where}: a parameter cannot be called {reserved!r}, {instead}; valid: another name"
         )
-    if isinstance(entry, partial):
-        defaults = {**dict(zip(parameters, entry.args, strict=False)), **entry.keywords}
-    try:
-        file = inspect.getsourcefile(factory) or file
-    except TypeError:
-        pass
-    return Plugin(name, factory, file, defaults)
-
-
-def _class_from_file(path: str, class_name: str) -> type:
-    """Import a class from a file that the user named."""
-    module = _module_from_file(path)
-    found = getattr(module, class_name, None)
-    if not isinstance(found, type):
-        classes = [value.__name__ for value in _own_classes(module)]
-        raise unknown("class", class_name, classes, f"in {path}")
-    return found
-
-
-def _own_classes(module: ModuleType) -> list[type]:
-    own = [value for value in vars(module).values() if isinstance(value, type)]
-    return [value for value in own if value.__module__ == module.__name__]
-
-
-@lru_cache
-def _module_from_file(path: str) -> ModuleType:
-    file = Path(path)
-    if not os.path.isfile(path):  # unlike Path.is_file, False for a name that is too long
-        raise DikbenchError(f"file not found: {path}; valid: path/to/file.py:Class")
-    spec = importlib.util.spec_from_file_location(f"dikbench_user_{file.stem}", file)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # where dataclasses and pickle look it up
-    try:
-        spec.loader.exec_module(module)
-    except Exception as error:
-        slip = "non-frozen dataclass from a frozen" in str(error)
-        hint = "; valid: @dataclass(frozen=True) above the class" if slip else ""
-        said = str(error) if isinstance(error, DikbenchError) else in_words(error) + hint
-        raise DikbenchError(f"{path} cannot be imported: {said}") from error
-    return module
+    if isinstance(named.value, partial):
+        given, entry = dict(zip(parameters, named.value.args, strict=False)), named.value
+        defaults = {**given, **entry.keywords}
+    file = named.file
+    if factory is not named.value:  # the table says nothing of the class
+        try:
+            file = inspect.getsourcefile(factory) or file
+        except TypeError:
+            pass
+    return Plugin(named.name, factory, file, defaults)

@@ -23,9 +23,13 @@ def source_digest(plugin: Plugin) -> str:
     The source is its own file and the modules of its package that it imports, directly or
     indirectly: plug-ins that share a module change with it, and no others do.
     """
-    module = plugin.factory.__module__
+    return digest_of_module(plugin.factory.__module__, plugin.file)
+
+
+def digest_of_module(module: str, file: str) -> str:
+    """Hash a module and those of its package that it imports (see `source_digest`)."""
     packages = frozenset({*SHARED_PACKAGES, module.partition(".")[0]})
-    files: dict[str, str] = {module: plugin.file}
+    files: dict[str, str] = {module: file}
     waiting = [module]
     while waiting:
         name = waiting.pop()

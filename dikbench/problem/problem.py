@@ -111,6 +111,27 @@ class Solve(Protocol):
         """
         ...
 
+    def verify(
+        self,
+        program: QuadraticProgram,
+        x: Array,
+        y: Array | None = None,
+        z: Array | None = None,
+        z_box: Array | None = None,
+    ) -> None:
+        """Hand over a program that the formulation solved itself, to be rechecked like others.
+
+        It costs the formulation no time, and its answer counts as one that was claimed.
+
+        Args:
+            program: the program.
+            x: the answer.
+            y: multipliers of the equalities, where they are known (see `Answer`).
+            z: those of the inequalities.
+            z_box: those of the bounds.
+        """
+        ...
+
 
 @runtime_checkable
 class Formulation(Protocol):
@@ -133,6 +154,8 @@ class Formulation(Protocol):
     `DikProblem`), (N, nv), each as if it were alone: matrices with the functions of
     `dikbench.problem`, everything else element by element or over the last axis. NaN in a row
     stands for an answer that it has to be asked for alone.
+
+    With `strict = True` it promises that no task of lower priority costs the first one anything.
     """
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
@@ -158,6 +181,11 @@ def promises_of(formulation: Formulation) -> frozenset[LimitKind]:
 def computes_kinematics(formulation: Formulation) -> bool:
     """Whether the formulation computes kinematics of its own, as part of its call."""
     return bool(getattr(formulation, "computes_kinematics", False))
+
+
+def is_strict(formulation: Formulation) -> bool:
+    """Whether the formulation promises that lower tasks cost the first priority nothing."""
+    return bool(getattr(formulation, "strict", False))
 
 
 def not_installed(formulation: Formulation | type) -> str:

@@ -132,7 +132,7 @@ def read_results(path: Path, *, lenient: bool = False) -> Results:
     folder = ResultsFolder(path)
     trials, manifest, notes = _stored_or_exported(folder, lenient=lenient)
     if lenient:
-        trials = _complete(trials, notes)
+        trials = _complete(trials, notes, _other_metrics(manifest))
         if trials.empty:
             raise DikbenchError(f"no results in {path}: there is no row of a trial to be read")
     elif notes:
@@ -142,7 +142,7 @@ def read_results(path: Path, *, lenient: bool = False) -> Results:
     except DikbenchError as error:
         raise DikbenchError(f"{path}: {error}") from None
     # Columns that were added one by one lie apart, which pandas warns about.
-    return Results(folder, manifest, _described(trials.copy()), tuple(notes))
+    return Results(folder, manifest, _described(trials.copy(), manifest), tuple(notes))
 
 
 def without_attributes(results: Results) -> Results:
@@ -202,8 +202,18 @@ def _version(environment: dict[str, Any]) -> str:
     return f"{version} (commit {commit[:8]}{'+' * commit.endswith('+')})" if commit else version
 
 
-def _complete(rows: pd.DataFrame, notes: list[str]) -> pd.DataFrame:
-    """Return the rows with every known column, numbers as numbers or empty."""
+def _other_metrics(manifest: dict[str, Any]) -> dict[str, tuple[str, str]]:
+    """Return unit and definition of the metrics of other authors that a manifest describes."""
+    told = manifest.get("metrics")
+    return {
+        str(name): (str(each.get("unit", "")), str(each.get("definition", "")))
+        for name, each in (told.items() if isinstance(told, dict) else ())
+        if isinstance(each, dict)
+    }
+
+
+def _complete(rows: pd.DataFrame, notes: list[str], others: Iterable[str]) -> pd.DataFrame:
+    """Return the rows with every known column, and those of others, numbers as numbers or empty."""
     lacking = [name for name in METRICS if name not in rows]
     if lacking:
         notes.append(
@@ -216,7 +226,7 @@ def _complete(rows: pd.DataFrame, notes: list[str]) -> pd.DataFrame:
             name: pd.to_numeric(rows[name], errors="coerce").astype(float)
             if name in rows
             else float("nan")
-            for name in NUMBERS
+            for name in (*NUMBERS, *others)
         },
     }
     found = pd.DataFrame(columns, index=rows.index)
@@ -260,9 +270,10 @@ def _manifest(folder: Path, notes: list[str]) -> dict[str, Any]:
     return found
 
 
-def _described(trials: pd.DataFrame) -> pd.DataFrame:
+def _described(trials: pd.DataFrame, manifest: dict[str, Any]) -> pd.DataFrame:
     """Attach units and definitions of the columns; empty where unknown to this version."""
     known = {
+        **_other_metrics(manifest),
         **DESCRIBED,
         **{metric.name: (metric.unit, metric.definition) for metric in METRICS.values()},
     }

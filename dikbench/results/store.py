@@ -7,7 +7,6 @@ import json
 import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
@@ -16,7 +15,9 @@ import pandas as pd
 from dikbench.errors import DikbenchError
 from dikbench.metrics import OUTCOME_TEXTS
 from dikbench.results.columns import RENAMED_METRICS, TIMED, TIMES, TRIAL
+from dikbench.results.other_metrics import add, described_in
 from dikbench.results.schema import NUMBERS, ROW, SCHEMA_VERSION, TABLES, check_format, migrate
+from dikbench.results.stored_trial import StoredTrial
 from dikbench.results.versions import is_outdated, versions_of_rows
 from dikbench.scenario.oracle import ORACLES
 from dikbench.study.identity import timing_id, timing_id_today, trial_id_today
@@ -28,23 +29,6 @@ class OtherVersion(DikbenchError):
     """A store of a version with other tables or metrics."""
 
 
-@dataclass(frozen=True)
-class StoredTrial:
-    """The identity of a row.
-
-    Attributes:
-        id: see `trial_id`.
-        trial: the cell.
-        steps: number of its control steps.
-        status: how it ended, by its name.
-    """
-
-    id: str
-    trial: Trial
-    steps: int
-    status: str
-
-
 class Store:
     """An open store; one process writes, committing rows as they come, others may read.
 
@@ -52,6 +36,9 @@ class Store:
         path: its file.
         add_metrics: whether a store that lacks metrics gets their columns, empty, instead of being
             refused.
+
+    Attributes:
+        other_metrics: descriptions of the metrics of other authors that it has, by name.
     """
 
     def __init__(self, path: Path, *, add_metrics: bool = False) -> None:
@@ -74,6 +61,7 @@ class Store:
         self._file = path.stat()
         self._described: tuple[Mapping[str, Any] | None, str] = None, ""  # of the last row
         self._environments = {row[0] for row in self._rows("SELECT id FROM environments")}
+        self.other_metrics = described_in(self._database)
 
     def __enter__(self) -> Self:
         """Return the store."""
@@ -136,6 +124,13 @@ class Store:
         ]
         where = " AND ".join(f"{name} = ?" for name in TIMED)
         self._database.executemany(f"UPDATE times SET superseded = ? WHERE {where}", of_times)
+
+    def add_other_metrics(self, asked: Mapping[str, Mapping[str, Any]]) -> list[str]:
+        """Add metrics of other authors; return those whose values another source had computed."""
+        with self._guarded(), self._transaction():
+            changed = add(self._database, asked)
+        self.other_metrics = described_in(self._database)
+        return changed
 
     def statuses(self) -> dict[str, str]:
         """Return the status of every trial that has a row, by id."""
@@ -200,11 +195,12 @@ class Store:
 
     def record_trials(self, rows: Sequence[tuple[Mapping[str, Any], int]], run: int) -> None:
         """Commit rows of trials and their positions, all or none, in place of earlier ones."""
+        columns = {**ROW, **dict.fromkeys(self.other_metrics)}
         values = [
-            (*(row.get(name, nothing) for name, nothing in ROW.items()), run, position)
+            (*(row.get(name, nothing) for name, nothing in columns.items()), run, position)
             for row, position in rows
         ]
-        self._insert("trials", (*ROW, "run", "position"), values)
+        self._insert("trials", (*columns, "run", "position"), values)
 
     def record_metrics(self, trial: str, metrics: Mapping[str, Any]) -> None:
         """Commit the metrics and the outcome of a trial that has a row, and nothing else of it."""
@@ -222,11 +218,11 @@ class Store:
 
     def trials(self) -> pd.DataFrame:
         """Return every trial with its times, those of the last plan first and in its order."""
-        order = ", ".join((*ROW, "run"))
+        order = ", ".join((*ROW, *self.other_metrics, "run"))
         trials = self._frame(
             f"SELECT {order} FROM trials WHERE NOT superseded "
             f"ORDER BY position IS NULL, position, {', '.join(TRIAL)}",
-            NUMBERS,
+            (*NUMBERS, *self.other_metrics),
         )
         return trials.merge(self.times(), on=TIMED, how="left")
 
@@ -249,9 +245,10 @@ class Store:
             "JOIN environments ON environments.id = environment "
             "WHERE NOT superseded GROUP BY solver, environment ORDER BY MIN(run), environment"
         )
-        return versions_of_rows(
+        found = versions_of_rows(
             self._last_run(), [(solver, name, json.loads(text)) for solver, name, text in made]
         )
+        return {**found, "metrics": self.other_metrics} if self.other_metrics else found
 
     def _last_run(self) -> dict[str, Any]:
         rows = self._rows("SELECT manifest FROM runs ORDER BY id DESC LIMIT 1")

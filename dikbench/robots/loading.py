@@ -14,15 +14,17 @@ import numpy as np
 import pinocchio as pin
 
 from dikbench.arrays import Array
-from dikbench.errors import LONGEST_CHARACTERS, NEAREST_NAMES, DikbenchError, unknown
-from dikbench.robots.catalogue import ROBOTS
+from dikbench.errors import LONGEST_CHARACTERS, NEAREST_NAMES, DikbenchError, in_words, unknown
+from dikbench.robots.catalogue import ROBOTS, CatalogueEntry
 from dikbench.robots.example_robot_data import DataModel, data_file, urdf_visuals
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.mimic import with_followers
+from dikbench.robots.plugged import EVERY_ROBOT, robot_entry
 from dikbench.robots.robot import Robot, checked_vector, frame_id, model_limits
 from dikbench.robots.safe_start import safe_start
 from dikbench.robots.task_rows import parsed_rows
 from dikbench.robots.urdf import Root, urdf_model
+from dikbench.user_code import in_file
 
 POSTURES_LOOKED_AT: Final = 4
 """Postures at which it is seen which rows of a twist an arm moves."""
@@ -48,14 +50,17 @@ def load_robot(
     velocity: LimitNumbers | None = None,
     acceleration: LimitNumbers | None = None,
 ) -> Robot:
-    """Load a robot by name, or any URDF file together with the name of its task frame.
+    """Load a robot by name, or from any URDF file together with the name of its task frame.
+
+    A robot of yours that is built in code is named as `path/to/file.py:NAME`.
 
     Position and velocity limits are the model's. Effort limits, and the acceleration limits of the
     catalogue, are known but not in force (see `Robot.with_limits`). Joints that mimic others in the
     URDF follow them: they have no velocity of their own, and their limits hold.
 
     Args:
-        name_or_urdf: a name of `dikbench list robots`, or the path of a URDF file.
+        name_or_urdf: a name of `dikbench list robots`, `path/to/file.py:NAME`, or the path of a
+            URDF file.
         frame: the task frame; default: the catalogue's. A URDF has no default.
         start: the safe start, shape (nq,) [rad]; default: the catalogue's, for a URDF the
             best-conditioned of 64 seeded postures inside the limits.
@@ -72,14 +77,14 @@ def load_robot(
             sense, a frame that no joint moves, or a start or a position outside the limits.
     """
     text = str(name_or_urdf)
-    if text in ROBOTS:
+    if in_file(text) or text in EVERY_ROBOT:
         if root != "fixed":
             raise DikbenchError(f"robot {text}: root={root} is for a URDF; valid: fixed")
         robot = _named(text)
     elif text.endswith((".urdf", ".xml", ".xacro")) or "/" in text or os.path.isfile(text):
         robot = _from_urdf(text, frame, root)
     else:
-        raise unknown("robot", text, ROBOTS, "(or give the path of a .urdf file)")
+        raise unknown("robot", text, EVERY_ROBOT.names(), "(or give the path of a .urdf file)")
     if frame is not None and frame != robot.frame:
         frame_id(robot.model, frame)
         robot = replace(robot, frame=frame)
@@ -133,7 +138,21 @@ def limit_numbers(value: LimitNumbers, kind: str) -> float | list[float]:
 
 @lru_cache
 def _named(name: str) -> Robot:
-    entry = ROBOTS[name]
+    """Make a robot of the catalogue, or of another author, from its entry."""
+    entry = robot_entry(name)
+    if name in ROBOTS:
+        return robot_of_entry(name, entry)
+    try:
+        return robot_of_entry(name.rpartition(":")[2], entry)
+    except MemoryError:
+        raise
+    except Exception as error:
+        said = str(error) if isinstance(error, DikbenchError) else in_words(error)
+        raise DikbenchError(f"robot {name}: {said}") from error
+
+
+def robot_of_entry(name: str, entry: CatalogueEntry) -> Robot:
+    """Make the robot of an entry, under a name."""
     model = entry.model()
     model.name = name
     limits = model_limits(model).with_interval("effort", None)

@@ -7,7 +7,6 @@ from typing import Any, Final, NamedTuple
 
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building_together import make_scenarios
-from dikbench.plugins.finding import in_file
 from dikbench.results.columns import TRIAL
 from dikbench.run.trial_row import Prepared, prepare
 from dikbench.run.trials_together import in_lockstep, kind_of_trial
@@ -17,6 +16,7 @@ from dikbench.simulation.closed_loop import Run, simulate
 from dikbench.simulation.status import Status
 from dikbench.study.identity import trial_id
 from dikbench.study.trial import Trial
+from dikbench.user_code import names_code
 
 ENDED: Final = frozenset({Status.OK.value, Status.DIVERGED.value, Status.PROTECTIVE_STOP.value})
 """Of trials that came to an end by themselves."""
@@ -45,9 +45,10 @@ def same_here(rows: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     for row in rows:
         try:
             trial = _trial(row)
-            if row["status"] not in ENDED or in_file(trial.formulation.name):
+            parts = trial.formulation, trial.scenario, trial.solver, trial.plant
+            if row["status"] not in ENDED or any(map(names_code, parts)):
                 continue
-            if not in_file(trial.scenario.name) and trial_id(trial) == row["id"]:
+            if trial_id(trial) == row["id"]:
                 found.append(row)
         except DikbenchError:
             continue

@@ -40,6 +40,7 @@ class RunSettings:
         engine: whether trials of one kind run in lockstep or each alone (see `engine_of`).
         rerun: which finished trials are run again: "", "failed", "outdated" (made by other sources
             or versions), "all", or the selector (or the name) of a formulation, scenario or solver.
+        metrics: metrics of other authors that are computed in addition.
     """
 
     jobs: int
@@ -48,6 +49,7 @@ class RunSettings:
     traces: TracePolicy = "all"
     rerun: str = ""
     engine: EngineChoice = "auto"
+    metrics: tuple[str, ...] = ()
 
 
 def run_trials(
@@ -86,7 +88,7 @@ def _run_blocks(
 ) -> Iterator[list[tuple[PlannedTrial, TrialRow]]]:
     """Run blocks of trials in worker processes; what kills its worker is run in smaller ones."""
     most = TRIALS_HANDED_AHEAD_PER_WORKER * settings.jobs
-    given = settings.traces, commit, command
+    given = settings.traces, commit, command, settings.metrics
     processes: set[int] = set()
     try:
         with workers(settings.jobs, WORK, settings.trial_memory) as pool:

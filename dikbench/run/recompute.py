@@ -12,9 +12,19 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from dikbench.errors import DikbenchError
-from dikbench.metrics import evaluate, motion_of, outcome_columns
+from dikbench.metrics import (
+    described,
+    evaluate,
+    evaluate_others,
+    motion_of,
+    other_metrics,
+    outcome_columns,
+    take_errors,
+)
 from dikbench.results.folder import ResultsFolder
-from dikbench.results.store import Store, StoredTrial
+from dikbench.results.store import Store
+from dikbench.results.stored_trial import StoredTrial
+from dikbench.run.other_metrics import tell
 from dikbench.run.pool import workers
 from dikbench.run.progress_display import ProgressDisplay
 from dikbench.run.provenance import environment, git_commit
@@ -58,7 +68,9 @@ class Recomputed:
         return f"{self.done} trials recomputed{rest}"
 
 
-def recompute_results(out: Path, jobs: int, command: str) -> Recomputed:
+def recompute_results(
+    out: Path, jobs: int, command: str, metrics: Sequence[str] = ()
+) -> Recomputed:
     """Compute metrics and outcomes of a results folder again from its traces, and export it.
 
     A trial is recomputed only if its formulation and scenario are unchanged.
@@ -67,9 +79,11 @@ def recompute_results(out: Path, jobs: int, command: str) -> Recomputed:
         out: results folder.
         jobs: number of worker processes.
         command: the command line, for the manifest.
+        metrics: metrics of other authors, in addition to those that the folder has.
 
     Raises:
-        DikbenchError: if the folder has no results or no traces, or another run uses it.
+        DikbenchError: if a metric is unknown, the folder has no results or no traces, or another
+            run uses it.
         Interrupted: if the user stops it; what is finished is kept.
     """
     folder = ResultsFolder(out)
@@ -82,14 +96,17 @@ def recompute_results(out: Path, jobs: int, command: str) -> Recomputed:
                 f"no traces in {folder.traces}: they were not kept (`--traces none`), or removed"
             )
         todo = [stored for stored in traced if trial_id_today(stored.trial.row) == stored.id]
+        there = [str(each["selector"]) for each in store.other_metrics.values()]
+        metrics = tuple(dict.fromkeys([*there, *metrics]))
+        store.add_other_metrics(described(other_metrics(metrics)))
         try:
-            failed = _recompute(store, folder, todo, jobs)
+            failed = _recompute(store, folder, todo, jobs, metrics)
         except KeyboardInterrupt:
             folder.export(store)
             raise Interrupted("what was recomputed is kept") from None
-        described = environment(git_commit(), command)
+        made = environment(git_commit(), command)
         finished = datetime.now(UTC).isoformat(timespec="seconds")
-        store.note("recomputed", {"finished": finished, **described})
+        store.note("recomputed", {"finished": finished, **made})
         folder.export(store)
         store.close_neatly()
     done = len(todo) - len(failed)
@@ -97,10 +114,15 @@ def recompute_results(out: Path, jobs: int, command: str) -> Recomputed:
 
 
 def _recompute(
-    store: Store, folder: ResultsFolder, todo: Sequence[StoredTrial], jobs: int
+    store: Store,
+    folder: ResultsFolder,
+    todo: Sequence[StoredTrial],
+    jobs: int,
+    metrics: Sequence[str],
 ) -> dict[str, str]:
     """Recompute trials in worker processes and commit each; return the reasons of failures."""
     failed: dict[str, str] = {}
+    errors: dict[str, str] = {}
     # In the order of scenarios, so that a worker builds each once.
     order = sorted(todo, key=lambda stored: (str(stored.trial.scenario), stored.trial.seed))
     with (
@@ -108,24 +130,26 @@ def _recompute(
         ProgressDisplay(len(todo), "recomputed trials") as display,
     ):
         futures: dict[Future[Any], StoredTrial] = {
-            pool.schedule(metrics_of, args=(stored, folder.trace(stored.id))): stored
+            pool.schedule(metrics_of, args=(stored, folder.trace(stored.id), metrics)): stored
             for stored in order
         }
         for future in as_completed(futures):
             stored = futures[future]
             try:
-                metrics = future.result()
+                found = future.result()
             except Exception as error:  # a plug-in's scenario may raise anything
                 failed[f"{stored.trial} ({stored.id})"] = " ".join(str(error).split())
             else:
-                store.record_metrics(stored.id, metrics)
+                take_errors(found, errors)
+                store.record_metrics(stored.id, found)
             display.advance()
     for name, reason in failed.items():
         print(f"not recomputed: {name}: {reason}", file=sys.stderr)
+    tell(errors)
     return failed
 
 
-def metrics_of(stored: StoredTrial, file: Path) -> dict[str, Any]:
+def metrics_of(stored: StoredTrial, file: Path, metrics: Sequence[str] = ()) -> dict[str, Any]:
     """Compute the metrics and the outcome of a trial from its trace, in a worker process.
 
     Raises:
@@ -136,7 +160,11 @@ def metrics_of(stored: StoredTrial, file: Path) -> dict[str, Any]:
     trace = Trace.load(file)
     _check_fits(trace, scenario, stored.steps, file)
     motion = motion_of(trace, scenario)
-    return {**evaluate(motion), **outcome_columns(motion, STATUSES[stored.status])}
+    return {
+        **evaluate(motion),
+        **evaluate_others(motion, other_metrics(metrics)),
+        **outcome_columns(motion, STATUSES[stored.status]),
+    }
 
 
 def _check_fits(trace: Trace, scenario: Scenario, steps: int, file: Path) -> None:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import sys
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Final
 
 from dikbench.errors import DikbenchError, unknown
+from dikbench.metrics import take_errors
 from dikbench.results.columns import TRIAL
 from dikbench.results.folder import ResultsFolder
 from dikbench.results.peers import write_peers
@@ -20,6 +22,7 @@ from dikbench.run.blocks import (
 from dikbench.run.folder_of_instances import instances_in
 from dikbench.run.folder_of_study import store_for
 from dikbench.run.in_workers import RunSettings, run_trials
+from dikbench.run.other_metrics import clear_outdated, tell
 from dikbench.run.peers import compare_with_peers, pairs_of, with_ticks
 from dikbench.run.pool import THREAD_VARIABLES, workers
 from dikbench.run.progress_display import ProgressDisplay
@@ -66,11 +69,13 @@ def run_study(study: Study, out: Path, settings: RunSettings, command: str) -> R
     folder = ResultsFolder(out)
     planned = expand(study, partial(instances_in, folder))
     _check_rerun(settings.rerun, planned)
+    settings = replace(settings, metrics=study.metrics)
     with store_for(folder, study) as store:
         commit = git_commit()
         own = environment(commit, command)
         # What a worker of this run would say of itself, for rows of workers that died.
         worker = own | {"threads": dict.fromkeys(THREAD_VARIABLES, "1")}
+        clear_outdated(store, study.metrics, out)
         hidden = store.hidden()
         engine = engine_of(planned, settings.engine, store)
         described = {**manifest(study, len(planned), own), "engine": engine}
@@ -89,15 +94,18 @@ def run_study(study: Study, out: Path, settings: RunSettings, command: str) -> R
         ]
         if len(todo) < len(planned):
             print(f"{len(planned) - len(todo)} of {len(planned)} trials are done", file=sys.stderr)
+        errors: dict[str, str] = {}
         try:
             with ProgressDisplay(len(todo), "trials") as display:
                 for rows in run_trials(todo, folder, settings, commit, command, engine):
                     for _, row in rows:
+                        take_errors(row, errors)
                         row["environment"] = store.environment(row.pop("described", worker))
                     store.record_trials(
                         [({"id": trial.id, **row}, positions[trial.id]) for trial, row in rows], run
                     )
                     display.advance(len(rows))
+            tell(errors)
             if study.timing is not None:
                 known = set() if settings.rerun == "all" else store.timed() - outdated
                 _time(folder, store, run, study, planned, known, worker)

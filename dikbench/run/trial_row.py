@@ -11,7 +11,7 @@ from time import perf_counter
 from typing import Any, Literal
 
 from dikbench.errors import DikbenchError
-from dikbench.metrics import Measured, Outcome, measure
+from dikbench.metrics import Measured, Outcome, measure, other_metrics
 from dikbench.plugins.building import make_formulation, make_plant, make_scenario
 from dikbench.problem.posing import pose_problem
 from dikbench.problem.problem import (
@@ -77,7 +77,12 @@ def described(commit: str | None, command: str) -> TrialRow:
 
 
 def work(
-    trial: Trial, trace: Path, policy: TracePolicy, commit: str | None, command: str
+    trial: Trial,
+    trace: Path,
+    policy: TracePolicy,
+    commit: str | None,
+    command: str,
+    metrics: Sequence[str] = (),
 ) -> tuple[TrialRow, TrialRow]:
     """Run a trial in a worker process; any failure of its plug-ins becomes a status.
 
@@ -87,6 +92,7 @@ def work(
         policy: whether the trace is kept.
         commit: see `environment`.
         command: see `environment`.
+        metrics: see `run_trial`.
 
     Returns:
         Its row, and the description of this process.
@@ -94,7 +100,7 @@ def work(
     Raises:
         CannotStore: if the trace cannot be written.
     """
-    row = attempted(trial, lambda: run_trial(trial, trace, policy))
+    row = attempted(trial, lambda: run_trial(trial, trace, policy, metrics))
     return row, described(commit, command)
 
 
@@ -184,13 +190,19 @@ def prepare(trial: Trial, scenario: Scenario) -> Prepared | TrialRow:
     return Prepared(trial, scenario, formulation, make_plant(trial.plant), sight)
 
 
-def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "all") -> TrialRow:
+def run_trial(
+    trial: Trial,
+    trace: Path | None = None,
+    policy: TracePolicy = "all",
+    metrics: Sequence[str] = (),
+) -> TrialRow:
     """Run one trial.
 
     Args:
         trial: the cell.
         trace: file for its trace, or None.
         policy: whether the trace is kept.
+        metrics: metrics of other authors that are computed in addition.
 
     Returns:
         Its row: keys, status, message, number of steps, every metric, the outcome; what the
@@ -204,16 +216,18 @@ def run_trial(trial: Trial, trace: Path | None = None, policy: TracePolicy = "al
         found = prepare(trial, scenario_of(trial.scenario, trial.seed))
     except DikbenchError as error:
         return row_without_run(trial, Status.SKIPPED, str(error))
-    return run_prepared(found, trace, policy) if isinstance(found, Prepared) else found
+    return run_prepared(found, trace, policy, metrics) if isinstance(found, Prepared) else found
 
 
-def run_prepared(ready: Prepared, trace: Path | None, policy: TracePolicy) -> TrialRow:
+def run_prepared(
+    ready: Prepared, trace: Path | None, policy: TracePolicy, metrics: Sequence[str] = ()
+) -> TrialRow:
     """Run a trial alone (see `run_trial`)."""
     start, trial = perf_counter(), ready.trial
     run = simulate(
         ready.scenario, ready.formulation, ready.solve(), ready.plant, ready.mode, trial.seed
     )
-    [row] = rows_of([ready], [run], [trace], policy)
+    [row] = rows_of([ready], [run], [trace], policy, metrics)
     row["wall_time_s"] = perf_counter() - start
     row["control_time_s"] = (run.kinematics_ns + run.formulation_ns) / 1e9
     return row
@@ -224,6 +238,7 @@ def rows_of(
     runs: Sequence[Run],
     traces: Sequence[Path | None],
     policy: TracePolicy,
+    metrics: Sequence[str] = (),
 ) -> list[TrialRow]:
     """Make the rows of runs that are finished, without times, and keep their traces.
 
@@ -244,10 +259,12 @@ def rows_of(
         {
             **row_without_run(p.trial, run.status, run.message),
             "steps": run.trace.steps,
-            **metrics,
+            **values,
             **p.sight,
         }
-        for p, run, metrics in zip(ready, runs, measure(measured), strict=True)
+        for p, run, values in zip(
+            ready, runs, measure(measured, other_metrics(metrics)), strict=True
+        )
     ]
 
 

@@ -45,6 +45,7 @@ def work_together(
     policy: TracePolicy,
     commit: str | None,
     command: str,
+    metrics: Sequence[str] = (),
 ) -> tuple[list[TrialRow], TrialRow]:
     """Run a block of trials in a worker process (see `dikbench.run.trial_row.work`).
 
@@ -95,11 +96,12 @@ def work_together(
         [each.run for _, _, each in together],
         [traces[number] for number, _, _ in together],
         policy,
+        metrics,
     )
     for (number, _, each), row in zip(together, made, strict=True):
         rows[number] = {**row, "asked_alone_steps": each.asked_alone}
     for number, ready in alone:
-        run = partial(run_prepared, ready, traces[number], policy)
+        run = partial(run_prepared, ready, traces[number], policy, metrics)
         rows[number] = attempted(ready.trial, run)
     return [rows[number] for number in range(len(trials))], described(commit, command)
 

@@ -64,6 +64,7 @@ from dikbench.scenario.oracle import (
     position_margin,
     solve_placement,
 )
+from dikbench.scenario.plant import Plant, Step
 from dikbench.scenario.reference.curves import circle, lemniscate, plane_of
 from dikbench.scenario.reference.pose_file import PoseFile, read_poses
 from dikbench.scenario.reference.reference import (
@@ -114,6 +115,7 @@ __all__ = [
     "OrientationTask",
     "Parameters",
     "Perturbation",
+    "Plant",
     "PoseFile",
     "PoseTask",
     "PositionTask",
@@ -125,6 +127,7 @@ __all__ = [
     "Singularity",
     "Situation",
     "SphereObstacle",
+    "Step",
     "Task",
     "Time",
     "TorqueConstraint",

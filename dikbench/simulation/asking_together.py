@@ -10,7 +10,7 @@ import numpy as np
 from dikbench.arrays import Array, Mask
 from dikbench.problem.problem import DikProblem, Formulation, is_batched, program_of
 from dikbench.robots.limits import Limits
-from dikbench.solvers.checked_solve import CheckedSolve, NoSolve
+from dikbench.solvers.checked_solve import CheckedSolve
 from dikbench.solvers.many_solve import ManySolve
 from dikbench.solvers.recheck.rechecked import RecheckedSteps
 
@@ -38,7 +38,7 @@ class AskedTogether:
         self.solves = [*solves]
         self.rechecked: RecheckedSteps | None = None
         self._batched = is_batched(formulation)
-        self._many = ManySolve(guesses=guesses) if program_of(formulation) else None
+        self._many = ManySolve(guesses=guesses and program_of(formulation) is not None)
 
     def keep(self, kept: Mask, first: int) -> None:
         """Go on with some of the trials, the first of them in the row `first`."""
@@ -68,7 +68,7 @@ class AskedTogether:
         v = self._together(own, self.solves)
         if v is not None:
             problem.relaxed = own.relaxed
-            self.rechecked = None if self._many is None else self._many.rechecked
+            self.rechecked = self._many.rechecked
             return v, _unanswered(v) | ~finite
         v, records = np.full(shape, np.nan), RecheckedSteps(len(self.solves))
         relaxed = np.zeros(len(self.solves), dtype=int)
@@ -77,19 +77,18 @@ class AskedTogether:
             one = self._together(own, self.solves[row : row + 1])
             if one is not None:
                 v[row], relaxed[row] = one[0], np.ravel(own.relaxed)[0]
-                if self._many is not None:
+                if self._many.rechecked is not None:
                     _copy(self._many.rechecked, records, row)
+                    self.rechecked = records
         problem.relaxed = relaxed
-        self.rechecked = None if self._many is None else records
         return v, _unanswered(v)
 
     def _together(self, problem: DikProblem, solves: Sequence[CheckedSolve]) -> Array | None:
         """Ask for rows at once; None where that raises or is no array of velocities."""
-        if self._many is not None:
-            self._many.begin_step(solves)
+        self._many.begin_step(solves)
         try:
             with np.errstate():  # what it sets is not for others
-                answer: Any = self.formulation.velocity(problem, self._many or NoSolve())
+                answer: Any = self.formulation.velocity(problem, self._many)
         except MemoryError:
             raise
         except Exception:

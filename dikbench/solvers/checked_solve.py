@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import deepcopy
 from time import perf_counter_ns
 from typing import Any, Final
 
@@ -108,6 +109,23 @@ class CheckedSolve:
         self.checking_ns += perf_counter_ns() - solved
         raise error
 
+    def verify(
+        self,
+        program: QuadraticProgram,
+        x: Array,
+        y: Array | None = None,
+        z: Array | None = None,
+        z_box: Array | None = None,
+    ) -> None:
+        """Recheck what the formulation solved itself (see `Solve.verify`)."""
+        if not self._checks:
+            return
+        start = perf_counter_ns()
+        # The formulation may write into its arrays before the recheck comes to them.
+        answer = Answer(np.array(x, dtype=float), claimed=True, y=y, z=z, z_box=z_box)
+        self._solved.append((self._step, deepcopy(program), deepcopy(answer)))
+        self.checking_ns += perf_counter_ns() - start
+
     def _reason(self, program: QuadraticProgram | ModelledProgram) -> Infeasible | SolverFailed:
         """Decide why there is no answer; the timing pass does not ask."""
         matrices = program.matrices() if isinstance(program, ModelledProgram) else program
@@ -123,8 +141,8 @@ class NoSolve(CheckedSolve):
 
     __slots__ = ()
 
-    def __init__(self) -> None:
-        super().__init__(_refuse)
+    def __init__(self, *, checks: bool = True) -> None:
+        super().__init__(_refuse, checks=checks)
 
 
 def _refuse(program: object, site: int) -> Answer:
@@ -145,7 +163,7 @@ def make_solve(
             change the caches.
     """
     if solver is None or program is None:
-        return NoSolve()
+        return NoSolve(checks=checks)
     back_end = _back_end(solver, program)
     if solver.then is not None:
         back_end = _InTurn(back_end, _back_end(solver.then, program))
@@ -161,6 +179,10 @@ def _back_end(solver: Solver, program: ProgramKind) -> BackEnd:
         from dikbench.solvers.interfaces.warm import WarmSolver
 
         return WarmSolver(solver)
+    if solver.library is not None:
+        from dikbench.solvers.interfaces.of_library import LibrarySolver
+
+        return LibrarySolver(solver.library)
     from dikbench.solvers.interfaces.cold import ColdSolver
 
     return ColdSolver(solver)

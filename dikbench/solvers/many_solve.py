@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from dikbench.arrays import Array
+from dikbench.programs.answer import Answer
 from dikbench.programs.modelled_program import ModelledProgram
 from dikbench.programs.quadratic_program import QuadraticProgram
 from dikbench.solvers.checked_solve import CheckedSolve
@@ -26,10 +27,12 @@ class ManySolve:
     without an answer is NaN. All answers are rechecked.
 
     Attributes:
-        rechecked: of the current control step, a row each.
+        rechecked: of the current control step, a row each; None where nothing was solved.
     """
 
     __slots__ = ("_guesses", "_site", "_solves", "rechecked")
+
+    rechecked: RecheckedSteps | None
 
     def __init__(self, *, guesses: bool) -> None:
         self._guesses = guesses
@@ -37,8 +40,7 @@ class ManySolve:
 
     def begin_step(self, solves: Sequence[CheckedSolve]) -> None:
         """Begin a control step of trials with these solvers, one per row."""
-        self._solves, self._site = solves, 0
-        self.rechecked = RecheckedSteps(len(solves))
+        self._solves, self._site, self.rechecked = solves, 0, None
 
     def __call__(self, program: QuadraticProgram | ModelledProgram) -> Array:
         """Solve N programs; each part is that of all rows, or has a row each.
@@ -63,13 +65,38 @@ class ManySolve:
             if answer.claimed and answer.x is not None:
                 x[k] = answer.x
         if solved:
-            self.rechecked.recheck(solved, self._solves[0].tolerance)
+            self._records().recheck(solved, self._solves[0].tolerance)
         self._site += 1
         return x
 
+    def verify(
+        self,
+        program: QuadraticProgram,
+        x: Array,
+        y: Array | None = None,
+        z: Array | None = None,
+        z_box: Array | None = None,
+    ) -> None:
+        """Recheck what the formulation solved itself, rows without an answer left out.
+
+        Each part of the program and of the answer has a row each (see `Solve.verify`).
+        """
+        solved: list[Solved] = []
+        for k in np.flatnonzero(np.isfinite(x).all(axis=1)).tolist():
+            own = {"y": y, "z": z, "z_box": z_box}
+            parts: dict[str, Any] = {n: None if p is None else p[k] for n, p in own.items()}
+            solved.append((k, _row(program, k), Answer(x[k], claimed=True, **parts)))
+        if solved:
+            self._records().recheck(solved, self._solves[0].tolerance)
+
+    def _records(self) -> RecheckedSteps:
+        if self.rechecked is None:
+            self.rechecked = RecheckedSteps(len(self._solves))
+        return self.rechecked
+
     def _record(self, guess: Guess) -> None:
         """Record the rows that need no solver."""
-        kept, steps = guess.minimal, self.rechecked
+        kept, steps = guess.minimal, self._records()
         for record, worst in (
             (steps.primal, guess.primal),
             (steps.dual, guess.dual),

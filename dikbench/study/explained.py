@@ -27,6 +27,7 @@ VALID: Final[Mapping[str, str]] = MappingProxyType(
         "seeds": "a list of whole numbers that are at least 0, such as [0, 1]",
         "split": '"train" or "test"',
         "example": "one of the scenarios",
+        "metrics": 'a list of metrics of yours, such as ["my_metric.py:REVERSALS"]',
         "timing": 'a section [timing] with reference = "dls"',
         "timing.reference": 'a formulation that needs no solver, such as "dls"',
         "timing.problems": "a whole number that is at least 1",

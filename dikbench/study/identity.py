@@ -7,16 +7,20 @@ import os.path
 from collections.abc import Mapping
 from dataclasses import astuple, fields, is_dataclass
 from functools import lru_cache
+from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_formulation, make_plant, scenario_parameters
-from dikbench.plugins.finding import formulation_plugin, scenario_plugin
-from dikbench.plugins.source import digest, digest_of_file, source_digest
+from dikbench.plugins.finding import formulation_plugin, plant_plugin, scenario_plugin
+from dikbench.plugins.source import digest, digest_of_file, digest_of_module, source_digest
+from dikbench.robots.plugged import EVERY_ROBOT
 from dikbench.scenario.oracle import ORACLES
+from dikbench.scenario.plant import PLANTS
 from dikbench.selector import Selector, parse_selector
-from dikbench.solvers.catalogue.back_ends import Solver, parse_solver
+from dikbench.solvers.catalogue.back_ends import Solver, find_back_end, parse_solver
 from dikbench.study.trial import NO_SOLVER, Trial
+from dikbench.user_code import Named, in_file
 
 
 def trial_id(trial: Trial) -> str:
@@ -24,13 +28,16 @@ def trial_id(trial: Trial) -> str:
 
     It is a hash of the formulation and the scenario family with their parameters and sources (see
     `source_digest`), the solver with its interface and settings, the plant, the reference mode and
-    the seed. Selectors with the same meaning, such as an explicit default, give the same id.
+    the seed; of the sources of a robot, a solver and a plant as well, where they are of another
+    author. Selectors with the same meaning, such as an explicit default, give the same id.
 
     Raises:
         DikbenchError: if a selector does not name anything valid.
     """
     cell = timing_id(trial.formulation, trial.solver, trial.scenario)
     plant = (trial.plant.name, *astuple(make_plant(trial.plant)))
+    if trial.plant.name not in PLANTS:
+        plant += (source_digest(plant_plugin(trial.plant.name)),)
     how = (*plant, trial.reference, trial.seed)
     return digest(json.dumps((cell, *how)))
 
@@ -72,7 +79,11 @@ def _formulation(selector: Selector) -> str:
 @lru_cache(maxsize=65536)
 def scenario_id(selector: Selector) -> str:
     """Return the id of a scenario: family, parameters and source version, without the seed."""
-    values = {key: _described(value) for key, value in scenario_parameters(selector).items()}
+    parameters = scenario_parameters(selector)
+    values = {key: _described(value) for key, value in parameters.items()}
+    robot = parameters["robot"]
+    if (in_file(robot) or robot in EVERY_ROBOT) and (found := EVERY_ROBOT.find(robot)) is not None:
+        values["robot"] += f" {_source(found)}"
     plugin = scenario_plugin(selector.name)
     return digest(json.dumps([selector.name, values, source_digest(plugin)], sort_keys=True))
 
@@ -88,7 +99,21 @@ def _solver(selector: Selector) -> str:
 def _described_solver(solver: Solver) -> list[Any]:
     settings = {key: repr(value) for key, value in solver.settings.items()}
     then = [] if solver.then is None else [_described_solver(solver.then)]
-    return [solver.name, solver.interface, settings, solver.tolerance, *then]
+    own = find_back_end(solver.name)
+    source = [] if own.found is None else [_source(own.found), _version(own.package)]
+    return [solver.name, solver.interface, settings, solver.tolerance, *source, *then]
+
+
+def _source(found: Named) -> str:
+    return digest_of_module(found.module, found.file)
+
+
+def _version(distribution: str) -> str:
+    """Return the version of a distribution that a solver names; empty where it has none."""
+    try:
+        return version(distribution)
+    except (PackageNotFoundError, ValueError):
+        return ""
 
 
 def _described(value: Any) -> str:

@@ -9,6 +9,7 @@ from typing import Final
 import msgspec
 
 from dikbench.errors import DikbenchError
+from dikbench.metrics import other_metrics
 from dikbench.plugins.building import make_formulation, make_plant, scenario_parameters
 from dikbench.plugins.building_together import make_scenarios
 from dikbench.plugins.drawing import Cell
@@ -19,7 +20,7 @@ from dikbench.solvers.catalogue.back_ends import DEFAULT_SOLVER, parse_solver, w
 from dikbench.study.identity import trial_id
 from dikbench.study.instances import accepted, draw_missing, numbers_of
 from dikbench.study.split import check_split
-from dikbench.study.study import Cells, Study, naming
+from dikbench.study.study import Cells, Study, metric_named, naming
 from dikbench.study.trial import NO_SOLVER, Trial
 
 SCENARIOS_BUILT_FIRST: Final = 40
@@ -62,6 +63,10 @@ def expand(
     for plant in map(parse_selector, [*study.plants, *(p for c in study.cells for p in c.plants)]):
         with naming(plant, study.name):
             make_plant(plant)
+    for metric in study.metrics:
+        with naming(metric, study.name):
+            metric_named(metric)
+    other_metrics(study.metrics)
     _check_timing(study)
     columns: list[tuple[Cells, Selector, list[tuple[Selector, str]]]] = [
         (cells, formulation, _solvers_for(study, formulation, cells.solvers))

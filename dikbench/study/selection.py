@@ -26,6 +26,7 @@ class Selection(msgspec.Struct, frozen=True):
     Attributes:
         instances: number of instances of each scenario, in place of seeds; 0: the study's own.
         fraction: the share of them that is run.
+        metrics: metrics of other authors.
     """
 
     formulations: tuple[str, ...] = ()
@@ -36,6 +37,7 @@ class Selection(msgspec.Struct, frozen=True):
     references: tuple[str, ...] = ()
     instances: int = 0
     fraction: float = 1.0
+    metrics: tuple[str, ...] = ()
 
 
 def select(base: Study, selection: Selection, *, named: bool) -> Study:
@@ -69,7 +71,7 @@ def select(base: Study, selection: Selection, *, named: bool) -> Study:
     cells = tuple(msgspec.structs.replace(cell, **replaced) for cell in cells)
     changes: dict[str, Any] = {
         axis: getattr(selection, axis)
-        for axis in ("scenarios", "seeds", "plants", "references")
+        for axis in ("scenarios", "seeds", "plants", "references", "metrics")
         if getattr(selection, axis)
     }
     if selection.seeds and selection.instances:

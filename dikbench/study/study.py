@@ -12,6 +12,7 @@ from typing import Annotated, Final, Literal
 import msgspec
 
 from dikbench.errors import DikbenchError, unknown
+from dikbench.metrics import other_metrics
 from dikbench.plugins.building import (
     in_declared_order,
     make_formulation,
@@ -95,6 +96,7 @@ class Study(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         fraction: the share of them that is run, the first ones.
         example: the scenario whose runs are drawn over time; default: the first one.
         timing: the timing pass; None: no timing.
+        metrics: metrics of other authors that are computed beside those of dikbench.
         name: name of the study; default: the file's.
     """
 
@@ -109,6 +111,7 @@ class Study(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     fraction: Annotated[float, msgspec.Meta(gt=0, le=1)] = 1.0
     example: str = ""
     timing: TimingSettings | None = None
+    metrics: tuple[str, ...] = ()
     name: str = ""
 
 
@@ -170,11 +173,14 @@ def _check_values(study: Study, path: Path) -> None:
     Raises:
         DikbenchError: on the first selector that does not name anything valid.
     """
+    named: list[tuple[str, str, Callable[[str], object]]] = []
     makers: dict[str, Callable[[str], object]] = {
         "scenarios": scenario_parameters,
         "plants": make_plant,
     }
-    named = [(axis, text, makers[axis]) for axis in makers for text in getattr(study, axis)]
+    for text in study.metrics:
+        named.append(("metrics", text, metric_named))
+    named += [(axis, text, makers[axis]) for axis in makers for text in getattr(study, axis)]
     for number, cell in enumerate(study.cells):
         for axis, make in makers.items():
             named += [(f"cells[{number}].{axis}", text, make) for text in getattr(cell, axis)]
@@ -243,8 +249,25 @@ def folder_of(study: Study) -> str:
     """
     if study.name != SELECTED:
         return study.name
-    study = msgspec.structs.replace(study, fraction=1.0)  # a larger one continues the run
-    return f"{SELECTED}-{digest(msgspec.json.encode(study).decode())[:DIGITS]}"
+    selected = msgspec.to_builtins(study)
+    selected["fraction"] = 1.0  # a larger one continues the run
+    if not study.metrics:  # a folder of a dikbench that knew none is the same
+        del selected["metrics"]
+    return f"{SELECTED}-{digest(msgspec.json.encode(selected).decode())[:DIGITS]}"
+
+
+def metric_named(text: str | Selector) -> object:
+    """Find a metric by its selector, which has no parameters.
+
+    Raises:
+        DikbenchError: if there is none.
+    """
+    selector = parse_selector(text)
+    if selector.parameters:
+        raise DikbenchError(
+            f"metric {selector}: a metric has no parameters; valid: {selector.name}"
+        )
+    return other_metrics([selector.name])
 
 
 def program_named(formulation: str | Selector) -> ProgramKind | None:

@@ -64,10 +64,15 @@ class Asked:
         rechecked = solve.rechecked()
         status = Status.NOT_VERIFIED if rechecked.lied[0] else given.status
         residual = solve.calls * float(rechecked.primal[0])
-        return Answer(given.velocity, status, status.sentence, residual)
+        return Answer(given.velocity.copy(), status, status.sentence, residual)
 
     def velocity(self, problem: DikProblem) -> Array | None:
         """Ask likewise for the velocity alone, whatever a recheck would say; None: no answer."""
+        v = self.velocity_itself(problem)
+        return None if v is None else v.copy()
+
+    def velocity_itself(self, problem: DikProblem) -> Array | None:
+        """Ask likewise, and return the very array of the formulation."""
         return self._ask(problem)[0].velocity
 
     def _ask(self, problem: DikProblem) -> tuple[Answer, CheckedSolve]:

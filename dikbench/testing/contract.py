@@ -34,6 +34,11 @@ from dikbench.problem.problem import (
 from dikbench.programs.quadratic_program import ProgramKind
 from dikbench.simulation.status import Status
 from dikbench.testing.asked import LIMIT_TOLERANCE_RAD_S, Asked, asked_of
+from dikbench.testing.direction import check_direction
+from dikbench.testing.memory import check_memory
+from dikbench.testing.parameters import check_ranges
+from dikbench.testing.priority import check_priority
+from dikbench.testing.refusals import check_refusals
 from dikbench.testing.rows import check_rows
 from dikbench.testing.sight import check_sight
 from dikbench.testing.states import State
@@ -113,7 +118,12 @@ def _inputs(problem: DikProblem) -> dict[str, Array | float]:
         "dt": problem.dt,
         "limits.to_lower": problem.limits.to_lower,
         "limits.to_upper": problem.limits.to_upper,
+        "limits.coordinates": problem.limits.coordinates,
         "robot.q0": problem.robot.q0,
+        "robot.available_acceleration": problem.robot.available_acceleration,
+        "robot.model.lowerPositionLimit": problem.robot.model.lowerPositionLimit,
+        "robot.model.upperPositionLimit": problem.robot.model.upperPositionLimit,
+        "robot.model.velocityLimit": problem.robot.model.velocityLimit,
         "G": problem.G,
         "h": problem.h,
     }
@@ -251,17 +261,22 @@ def check_state(formulation: Formulation, state: State, solver: str | None = Non
 
 CHECKS: Final[tuple[Check, ...]] = (
     check_declaration,
+    check_ranges,
     check_sight,
     check_raises_only_cannot_answer,
     check_shape,
     check_finite,
+    check_direction,
     check_inputs_untouched,
     check_repeatable,
+    check_memory,
     check_picklable,
     check_position_limits,
     check_velocity_limits,
     check_acceleration_limits,
     check_inequalities,
+    check_priority,
+    check_refusals,
     check_rows,
 )
 """Every check: (formulation, solver's selector or None for the default) -> None.

@@ -12,23 +12,22 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable
-from dataclasses import is_dataclass, replace
+from dataclasses import is_dataclass
 from itertools import chain
-from math import isfinite, isnan, nan
-from types import UnionType
-from typing import Any, Final, Union, get_args, get_origin
+from typing import Final
 
 import numpy as np
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError, in_words
-from dikbench.parameters import Parameter, parameters_of
+from dikbench.parameters import parameters_of
 from dikbench.scenario.certificate import CertificateFailed
 from dikbench.scenario.family import Family
 from dikbench.scenario.misfits import misfits
 from dikbench.scenario.scenario import Scenario
 from dikbench.testing.cannot_check import CannotCheck
 from dikbench.testing.first_step import no_first_step
+from dikbench.testing.parameters import assert_ranges, changed_to, ends_of
 
 SEEDS: Final = (0, 1, 2)
 """The seeds of the scenarios that are checked; 0 perturbs nothing."""
@@ -58,60 +57,15 @@ def check_family_ranges(family: Family) -> None:
 
     What is outside of a range, and NaN, must be refused by an error that names the parameter.
     """
-    for name, parameter in parameters_of(type(family)).items():
-        if not parameter.numeric:
-            continue
-        if parameter.range is None:
-            raise AssertionError(f"{name} is a number without a Range")
-        for value in _outside(parameter):
-            try:
-                _changed(family, name, value)
-            except DikbenchError as error:
-                if name not in str(error):
-                    raise AssertionError(
-                        f"{name}={value}: the error does not name it: {error}"
-                    ) from error
-            else:
-                raise AssertionError(f"{name}={value} is accepted; valid: {parameter.valid}")
-        for value in _ends(parameter):
-            try:
-                _changed(family, name, value).scenario(0)
-            except DikbenchError:
-                pass  # it says why there is no such scenario
-            except Exception as error:
-                said = in_words(error)
-                raise CannotCheck(f"{name}={value}: raised {said}", said) from error
-
-
-def _changed(family: Family, name: str, value: object) -> Family:
-    changes: dict[str, Any] = {name: value}
-    return replace(family, **changes)
-
-
-def _is_of(parameter: Parameter, *kinds: type) -> bool:
-    union = get_origin(parameter.type) in (Union, UnionType)
-    return any(part in kinds for part in (get_args(parameter.type) if union else [parameter.type]))
-
-
-def _outside(parameter: Parameter) -> list[float]:
-    """List numbers that a parameter must not be: NaN, infinity, and what is next to its ends."""
-    found = [nan, np.inf, -np.inf]
-    assert parameter.range is not None
-    for end, away in ((parameter.range.low, -1.0), (parameter.range.high, 1.0)):
-        if isfinite(end):
-            step = 1.0 if _is_of(parameter, int) else max(1e-6, 1e-6 * abs(end))
-            found.append(end + away * step)
-    return [value for value in found if not parameter.range.holds(value)]
-
-
-def _ends(parameter: Parameter) -> list[float]:
-    """List the finite ends of the range of a parameter and of the bounds in which it is drawn."""
-    assert parameter.range is not None
-    ends = [parameter.range.low, parameter.range.high]
-    if parameter.drawn is not None and not isnan(parameter.drawn.low):
-        ends += [parameter.drawn.low, parameter.drawn.high]
-    finite = [end for end in dict.fromkeys(ends) if isfinite(end)]
-    return [int(end) for end in finite] if _is_of(parameter, int) else finite
+    assert_ranges(family)
+    for name, value in ends_of(family):
+        try:
+            changed_to(family, name, value).scenario(0)
+        except DikbenchError:
+            pass  # it says why there is no such scenario
+        except Exception as error:
+            said = in_words(error)
+            raise CannotCheck(f"{name}={value}: raised {said}", said) from error
 
 
 def check_family_certificate(family: Family) -> None:

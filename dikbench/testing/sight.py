@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from types import MappingProxyType
 from typing import Final
@@ -13,7 +13,7 @@ from dikbench.arrays import Array
 from dikbench.problem.problem import DikProblem, Formulation, ProblemPart, sight_of
 from dikbench.problem.tasks.task import LinearizedJointTask, LinearizedTask
 from dikbench.testing.asked import Asked, asked_of
-from dikbench.testing.states import states
+from dikbench.testing.states import State, states
 
 ROW_ROOM_RAD_S: Final = 0.01
 """How far from a standstill the added rows let the robot go."""
@@ -72,6 +72,11 @@ def _changed(
     return DikProblem(p.robot, p.q, p.v_prev, p.dt, tasks, p.limits, G=G, h=h)
 
 
+def alone(states: Iterable[State]) -> list[State]:
+    """Return the states with their first task alone, and without rows G v <= h."""
+    return [State(s.label, _changed(s.problem, s.problem.tasks[:1], None, None)) for s in states]
+
+
 def check_sight(formulation: Formulation | Asked, solver: str | None = None) -> None:
     """Check that what a formulation sees changes its answer somewhere, and nothing else does ever.
 
@@ -81,11 +86,11 @@ def check_sight(formulation: Formulation | Asked, solver: str | None = None) -> 
     asked = asked_of(formulation, solver)
     seen = sight_of(asked.formulation)
     said = frozenset(getattr(asked.formulation, "sees", ()))
-    bare = [(s.label, _changed(s.problem, s.problem.tasks[:1], None, None)) for s in states()]
-    alone = [asked.velocity(problem) for _, problem in bare]
+    bare = alone(states())
+    without = [asked.velocity(problem) for _, problem in bare]
     for what, (change, declared) in ADDED.items():
         random, differs = np.random.default_rng(0), False
-        for (label, problem), v in zip(bare, alone, strict=True):
+        for (label, problem), v in zip(bare, without, strict=True):
             w = asked.velocity(change(problem, random))
             same = v is w is None or (v is not None and w is not None and np.array_equal(v, w))
             differs |= not same

@@ -69,7 +69,7 @@ def states() -> Iterator[State]:
                 robot = replace(known, limits=pickle.loads(limits), q0=known.q0.copy())
                 if acceleration:
                     robot = robot.with_limits(acceleration=known.available_acceleration)
-                problem = _problem(robot, q, _twist(robot, random, speed), posture=posture)
+                problem = posed(robot, q, _twist(robot, random, speed), posture=posture)
                 problem.v_prev = _velocity_before(problem, before, random)
                 rows = count % 4 == 3
                 if rows:
@@ -136,7 +136,7 @@ def _rows(problem: DikProblem, random: np.random.Generator) -> tuple[Array, Arra
     return G, G @ inside + random.uniform(0, 0.3, 3)
 
 
-def _problem(robot: Robot, q: Array, twist: Array, *, posture: bool) -> DikProblem:
+def posed(robot: Robot, q: Array, twist: Array, *, posture: bool = False) -> DikProblem:
     """Pose the control step in which the frame is to move with a twist to a target."""
     kinematics = Kinematics(robot)
     kinematics.update(q.copy())

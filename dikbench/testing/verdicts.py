@@ -1,14 +1,17 @@
-"""Every check of a formulation or a family with its outcome, instead of the first failure."""
+"""Every check of a plug-in with its outcome, instead of the first failure."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from types import MappingProxyType
-from typing import Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
-from dikbench.problem.problem import Formulation, LimitKind, is_batched, promises_of
+from dikbench.problem.problem import Formulation, LimitKind, is_batched, is_strict, promises_of
+from dikbench.robots.catalogue import CatalogueEntry
 from dikbench.scenario.family import Family
+from dikbench.scenario.plant import Plant
+from dikbench.solvers.catalogue.back_ends import Solver
 from dikbench.testing.asked import Asked
 from dikbench.testing.cannot_check import CannotCheck
 from dikbench.testing.contract import (
@@ -20,8 +23,20 @@ from dikbench.testing.contract import (
     check_position_limits,
     check_velocity_limits,
 )
-from dikbench.testing.family import FAMILY_CHECKS, check_family_declaration
+from dikbench.testing.family import FAMILY_CHECKS
+from dikbench.testing.metric import METRIC_CHECKS, Metrics
+from dikbench.testing.plant import PLANT_CHECKS
+from dikbench.testing.priority import check_priority
+from dikbench.testing.robot import ROBOT_CHECKS
 from dikbench.testing.rows import check_rows
+from dikbench.testing.solver import (
+    SOLVER_CHECKS,
+    check_solver_linear_programs,
+    check_solver_presets,
+    check_solver_warm,
+    has_workspace,
+    solves_linear,
+)
 
 PROMISES: Final[Mapping[Check, LimitKind]] = MappingProxyType(
     {
@@ -61,7 +76,9 @@ def verdicts_on_formulation(
     for check in CHECKS[1:]:
         name = check.__name__.removeprefix("check_").replace("_", " ")
         promised = PROMISES[check] in promises_of(formulation) if check in PROMISES else True
-        if not promised or (check is check_rows and not is_batched(formulation)):
+        promised &= check is not check_rows or is_batched(formulation)
+        promised &= check is not check_priority or is_strict(formulation)
+        if not promised:
             yield Verdict(name, "not promised")
         else:
             yield _verdict(name, partial(check, asked, None), causes)
@@ -69,12 +86,49 @@ def verdicts_on_formulation(
 
 def verdicts_on_family(family: Family) -> Iterator[Verdict]:
     """Run the checks of a scenario family one by one; a broken declaration ends them."""
+    return _verdicts("family", FAMILY_CHECKS, family)
+
+
+def verdicts_on_solver(solver: Solver) -> Iterator[Verdict]:
+    """Run the checks of a solver likewise."""
+    promised: dict[Callable[[Any], None], bool] = {
+        check_solver_linear_programs: solves_linear(solver),
+        check_solver_warm: has_workspace(solver),
+        check_solver_presets: solver.library is not None and solver.library.has_presets(),
+    }
+    return _verdicts("solver", SOLVER_CHECKS, solver, promised)
+
+
+def verdicts_on_plant(plant: Plant) -> Iterator[Verdict]:
+    """Run the checks of a plant likewise."""
+    return _verdicts("plant", PLANT_CHECKS, plant)
+
+
+def verdicts_on_robot(entry: CatalogueEntry) -> Iterator[Verdict]:
+    """Run the checks of a robot likewise."""
+    return _verdicts("robot", ROBOT_CHECKS, entry)
+
+
+def verdicts_on_metric(metrics: Metrics) -> Iterator[Verdict]:
+    """Run the checks of a metric, or of a tuple of some, likewise."""
+    return _verdicts("metric", METRIC_CHECKS, metrics)
+
+
+def _verdicts(
+    kind: str,
+    checks: Sequence[Callable[[Any], None]],
+    subject: object,
+    promised: Mapping[Callable[[Any], None], bool] = MappingProxyType({}),
+) -> Iterator[Verdict]:
     causes: dict[str, str] = {}
-    for check in FAMILY_CHECKS:
-        name = check.__name__.removeprefix("check_family_").replace("_", " ")
-        verdict = _verdict(name, partial(check, family), causes)
+    for check in checks:
+        name = check.__name__.removeprefix(f"check_{kind}_").replace("_", " ")
+        if not promised.get(check, True):
+            yield Verdict(name, "not promised")
+            continue
+        verdict = _verdict(name, partial(check, subject), causes)
         yield verdict
-        if check is check_family_declaration and verdict.outcome == "BROKEN":
+        if name == "declaration" and verdict.outcome == "BROKEN":
             return
 
 

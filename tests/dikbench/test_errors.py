@@ -180,8 +180,8 @@ def test_a_file_without_plugins_says_so(tmp_path: Path) -> None:
     """Where a class is missing from the name, and there is none to choose."""
     (tmp_path / "empty.py").write_text("class Other: ...\n")
     assert error_of(make_formulation, str(tmp_path / "empty.py")).endswith(
-        "empty.py names a file without a class; valid: none, for it holds no formulation and no "
-        "family"
+        "empty.py names a file without a class; valid: none, for it holds no formulation, no "
+        "family and no plant"
     )
 
 

@@ -14,7 +14,7 @@ CHECKOUT: Final = Path(__file__).parents[2]
 
 FIRST_LEVEL: Final = (
     "annotations", "arrays", "errors", "linear_algebra", "linear_inequalities", "parameters",
-    "selector",
+    "selector", "user_code",
 )  # fmt: skip
 """Modules beside the rooms, the lowest floor."""
 
@@ -26,8 +26,8 @@ ROOMS: Final = (
     "scenario",
     "plugins",
     "simulation",
-    "testing",
     "metrics",
+    "testing",
     "study",
     "statistics",
     "results",

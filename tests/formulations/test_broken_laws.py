@@ -88,9 +88,9 @@ class NormalisesZero(Still):
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
-        V = problem.tasks[0].V
+        V = problem.primary.V
         with np.errstate(invalid="ignore"):
-            return 1e-9 * problem.tasks[0].J.T @ (V / np.linalg.norm(V))
+            return 1e-9 * problem.primary.J.T @ (V / np.linalg.norm(V))
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,7 @@ class PromisesVelocity:
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
-        task = problem.tasks[0]
+        task = problem.primary
         v: Array = np.linalg.pinv(task.J, rcond=1e-6) @ task.V
         return v
 
@@ -240,8 +240,9 @@ BROKEN: list[tuple[typing.Any, set[str]]] = [
     (NormalisesZero(), {"check_finite"}),
     (RaisesValueError(), {"check_raises_only_cannot_answer"}),
     (NeverAnswers(), {"check_raises_only_cannot_answer"}),
-    (ThrowsDice(), FORGETFUL | {"check_sight"}),  # whatever is added, the answer is another one
-    (Remembers(), FORGETFUL | {"check_sight"}),
+    # Whatever is added, the answer is another one.
+    (ThrowsDice(), FORGETFUL | {"check_memory", "check_sight"}),
+    (Remembers(), FORGETFUL | {"check_memory", "check_sight"}),
     (ReadsLeftovers(), FORGETFUL),
     (HoldsLambda(), {"check_picklable"}),
     (PromisesVelocity(), {"check_velocity_limits"}),

@@ -24,9 +24,9 @@ def pickled_states() -> list[bytes]:
 
 
 @contextmanager
-def few_states(turn: int) -> Iterator[None]:
+def few_states(turn: int, stride: int = STRIDE) -> Iterator[None]:
     """Have the contract ask at one state in so many meanwhile, the first of them in turns."""
-    few = pickled_states()[turn % STRIDE :: STRIDE]
+    few = pickled_states()[turn % stride :: stride]
     with pytest.MonkeyPatch.context() as patch:
         for name in ("asked", "sight"):
             module = import_module(f"dikbench.testing.{name}")

@@ -127,6 +127,10 @@ class KeepsProgram:
         self.program = program
         return self.solve(program)
 
+    def verify(self, program: QuadraticProgram, x: Array, *multipliers: Array | None) -> None:
+        """See `Solve`."""
+        self.solve.verify(program, x, *multipliers)
+
 
 def limits_at_distances(
     to_lower: object,

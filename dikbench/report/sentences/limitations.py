@@ -13,7 +13,7 @@ import pandas as pd
 from dikbench.arrays import Mask
 from dikbench.plugins.finding import plugins
 from dikbench.report.sentences.words import NOT_TIMED, listed, number, quoted, several
-from dikbench.scenario.oracle import ORACLE
+from dikbench.scenario.oracle import ORACLE, ORACLES
 from dikbench.scenario.plant import PLANTS, REFERENCE_MODES
 from dikbench.selector import parse_selector
 from dikbench.solvers.catalogue.back_ends import BACK_ENDS, DEFAULT_SOLVER, is_installed
@@ -66,6 +66,7 @@ def limitations(
     found += _ways(trials)
     found += _broken(trials)
     found += _steps(trials)
+    found += _not_rechecked(trials)
     found += _not_run(trials)
     return found
 
@@ -271,6 +272,20 @@ def _steps(trials: pd.DataFrame) -> list[Limitation]:
         if cases:
             found.append(Limitation(text, cases))
     return found
+
+
+def _not_rechecked(trials: pd.DataFrame) -> list[Limitation]:
+    """Formulations that had nothing solved, and handed nothing over either."""
+    ran = trials[trials["steps"].gt(0) & ~trials["formulation_name"].isin(ORACLES)]
+    if ran.empty:
+        return []
+    checked = ran["verified_share"].notna().groupby(ran["formulation"], sort=False).any()
+    names = [quoted(str(name)) for name in checked.index[~checked]]
+    text = (
+        "Answers that nothing rechecks: no program was handed over. Closed forms have none; one "
+        "that solves a program itself can hand it over (`solve.verify`)."
+    )
+    return [Limitation(text, (f"{listed(names, most=None)}.",))] if names else []
 
 
 def _not_run(trials: pd.DataFrame) -> list[Limitation]:

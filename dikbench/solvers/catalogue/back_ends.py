@@ -4,42 +4,25 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import msgspec
 
 from dikbench.errors import DikbenchError, unknown
 from dikbench.programs.quadratic_program import ProgramKind
 from dikbench.selector import Selector, parse_selector
-from dikbench.solvers.catalogue.presets import TOLERANCES, preset_settings
-
-Interface = Literal["cold", "warm", "cvxpy"]
-
-
-@dataclass(frozen=True)
-class BackEnd:
-    """A solver library.
-
-    Attributes:
-        summary: one line for `dikbench list solvers`.
-        package: the name of the library, for importing and installing it.
-        programs: what it can solve when called with matrices.
-        interfaces: how it can be called, the default first.
-        settings: the settings that it takes, with their types.
-        no_lp: why it cannot solve linear programs; empty where it can.
-        own_defaults: settings with a default of dikbench instead of the library's.
-    """
-
-    summary: str
-    package: str
-    programs: frozenset[ProgramKind]
-    interfaces: tuple[Interface, ...]
-    settings: Mapping[str, type]
-    no_lp: str = ""
-    own_defaults: Mapping[str, Any] = field(default_factory=dict)
-
+from dikbench.solvers.catalogue.back_end import BackEnd, Interface
+from dikbench.solvers.catalogue.library import SolverLibrary
+from dikbench.solvers.catalogue.plugged import back_end_of, built_library, misfit
+from dikbench.solvers.catalogue.presets import (
+    REQUESTED_TOLERANCE_SHARE,
+    TOLERANCES,
+    Preset,
+    preset_settings,
+)
+from dikbench.user_code import Pluggable
 
 _QP_ONLY: Final[frozenset[ProgramKind]] = frozenset({"qp"})
 _QP_AND_LP: Final[frozenset[ProgramKind]] = frozenset({"qp", "lp"})
@@ -113,6 +96,9 @@ BACK_ENDS: Mapping[str, BackEnd] = MappingProxyType(
     }
 )
 
+SOLVERS: Final = Pluggable("solver", BACK_ENDS, misfit)
+"""Where solvers are looked for: above, then among those of others."""
+
 DEFAULT_SOLVER: Final[Mapping[ProgramKind, str]] = MappingProxyType(
     {"qp": "daqp[then=clarabel]", "lp": "daqp[then=clarabel]", "cvxpy": "clarabel"}
 )
@@ -149,6 +135,7 @@ class Solver:
         tolerance: largest residual of a verified answer under its preset.
         then: the solver that is asked where this one gives no answer, under the same preset; None:
             no other.
+        library: the one that does not come with dikbench, with its settings.
     """
 
     name: str
@@ -156,6 +143,7 @@ class Solver:
     settings: Mapping[str, Any]
     tolerance: float = TOLERANCES["default"]
     then: Solver | None = None
+    library: SolverLibrary | None = None
 
 
 _VALID: Final[Mapping[type, str]] = MappingProxyType(
@@ -168,9 +156,19 @@ _VALID: Final[Mapping[type, str]] = MappingProxyType(
 """What a setting may be, by its type."""
 
 
+def find_back_end(name: str) -> BackEnd:
+    """Find a solver by its name, or by `path/to/file.py:Class`.
+
+    Raises:
+        DikbenchError: if there is no such solver, or what has the name is none.
+    """
+    found = SOLVERS.find(name)
+    return BACK_ENDS[name] if found is None else back_end_of(found)
+
+
 def is_installed(name: str) -> bool:
-    """Say whether the back end of this name can be imported here."""
-    return importlib.util.find_spec(BACK_ENDS[name].package) is not None
+    """Say whether the back end of this name can be imported here; one of another author is."""
+    return name not in BACK_ENDS or importlib.util.find_spec(BACK_ENDS[name].package) is not None
 
 
 def parse_solver(text: str | Selector) -> Solver:
@@ -184,9 +182,7 @@ def parse_solver(text: str | Selector) -> Solver:
             type, a solver that is not installed, or one that is to be asked after itself.
     """
     selector = parse_selector(text)
-    if selector.name not in BACK_ENDS:
-        raise unknown("solver", selector.name, BACK_ENDS)
-    back_end = BACK_ENDS[selector.name]
+    back_end = find_back_end(selector.name)
     if not is_installed(selector.name):
         raise DikbenchError(
             f"solver {selector.name!r} is not installed: pip install {back_end.package}"
@@ -200,15 +196,31 @@ def parse_solver(text: str | Selector) -> Solver:
     if interface not in back_end.interfaces:
         raise unknown(f"interface of solver {selector.name}", interface, back_end.interfaces)
     preset: Any = parameters.pop("preset", "default")
-    if preset not in TOLERANCES:
-        raise unknown(f"preset of solver {selector.name}", preset, TOLERANCES)
+    known = presets_of(back_end)
+    if preset not in known:
+        raise unknown(f"preset of solver {selector.name}", preset, known)
+    then = None if second is None else parse_solver(Selector(second, shared))
+    if back_end.library is not None:
+        eps = REQUESTED_TOLERANCE_SHARE * TOLERANCES[preset]
+        asked = None if preset == "default" else eps
+        library = built_library(back_end, selector.name, asked, parameters)
+        values = {name: getattr(library, name) for name in back_end.settings}
+        return Solver(
+            selector.name, interface, MappingProxyType(values), known[preset], then, library
+        )
     settings = {
         **back_end.own_defaults,
         **preset_settings(selector.name, preset),
         **_settings(back_end, selector, parameters),
     }
-    then = None if second is None else parse_solver(Selector(second, shared))
-    return Solver(selector.name, interface, MappingProxyType(settings), TOLERANCES[preset], then)
+    return Solver(selector.name, interface, MappingProxyType(settings), known[preset], then)
+
+
+def presets_of(back_end: BackEnd) -> Mapping[Preset, float]:
+    """Return the presets of a solver, each with the largest residual of a verified answer."""
+    if back_end.library is None or back_end.library.has_presets():
+        return TOLERANCES
+    return {"default": TOLERANCES["default"]}
 
 
 def why_not(solver: Solver, program: ProgramKind) -> str:
@@ -218,7 +230,7 @@ def why_not(solver: Solver, program: ProgramKind) -> str:
 
 
 def _why_not(solver: Solver, program: ProgramKind) -> str:
-    back_end = BACK_ENDS[solver.name]
+    back_end = find_back_end(solver.name)
     if program == "cvxpy":
         if solver.interface == "warm":
             return f"{solver.name}[interface=warm] takes matrices, not a formulation in cvxpy"

@@ -108,7 +108,7 @@ def test_a_formulation_that_keeps_its_promises(plugins_file: Path) -> None:
     found = outcomes(lines)
     assert code == 0
     assert len(found) == len(lines) == len(CHECKS)
-    promises = {"position limits", "acceleration limits", "inequalities", "rows"}
+    promises = {"position limits", "acceleration limits", "inequalities", "priority", "rows"}
     assert {name for name, outcome in found.items() if outcome == "not promised"} == promises
     assert {outcome for name, outcome in found.items() if name not in promises} == {"kept"}
 
@@ -189,7 +189,7 @@ def test_one_cause_is_named_once(plugins_file: Path, selector: str, cause: str) 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["nosuch"], "unknown formulation or scenario 'nosuch'"),
+        (["nosuch"], "unknown plug-in 'nosuch'"),
         (["lp-alhpa"], "did you mean 'lp-alpha'?"),
         (["reach", "--solver", "osqp"], "reach is a scenario family, which needs none"),
         (["reach[distance=9]"], "distance=9.0 must be 0.01 to 0.3"),

@@ -12,6 +12,7 @@ import pytest
 from makers.plugins import Install
 
 from dikbench.plugins.finding import plugins
+from dikbench.user_code import registered
 
 
 class _EntryPoint:
@@ -48,7 +49,9 @@ def install(monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
             importlib.metadata, "entry_points", lambda *, group: known.get(group, [])
         )
         plugins.cache_clear()
+        registered.cache_clear()
 
     yield replace_all
     monkeypatch.undo()
     plugins.cache_clear()
+    registered.cache_clear()

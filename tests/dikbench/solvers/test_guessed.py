@@ -116,6 +116,7 @@ def test_rows_are_solved_as_alone_and_rechecked(guesses: bool) -> None:
     many = ManySolve(guesses=guesses)
     many.begin_step([make_solve(solver, "qp") for _ in range(30)])
     x = many(program)
+    assert many.rechecked is not None
     assert (many.rechecked.verified == 1).all()
     assert not many.rechecked.lied.any()
     for row in range(30):
@@ -139,5 +140,6 @@ def test_a_row_without_an_answer_is_nan_and_not_claimed() -> None:
     many.begin_step([make_solve(solver, "qp") for _ in range(4)])
     x = many(QuadraticProgram(program.P, program.q, lb=lower, ub=program.ub))
     assert np.isfinite(x).all(axis=1).tolist() == [True, True, False, True]
+    assert many.rechecked is not None
     assert many.rechecked.claimed.tolist() == [1, 1, 0, 1]
     assert many.rechecked.verified.tolist() == [1, 1, 0, 1]

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from importlib import import_module
-from typing import Final
+from typing import Any, Final
 
 from dikbench.programs.answer import Answer
 from dikbench.programs.quadratic_program import QuadraticProgram
 from dikbench.solvers.catalogue.back_ends import Solver
-from dikbench.solvers.interfaces.warm.workspace import Workspace
+from dikbench.solvers.catalogue.library import Workspace
+from dikbench.solvers.interfaces.of_library import LibraryWorkspace
 
 WORKSPACES: Final = {
     "osqp": "OsqpWorkspace",
@@ -28,12 +31,10 @@ Structure = tuple[int, int | None, int | None, bool, bool]
 class WarmSolver:
     """A back end with a workspace per call site, remade where the structure changes."""
 
-    __slots__ = ("_make", "_settings", "_sites")
+    __slots__ = ("_make", "_sites")
 
     def __init__(self, solver: Solver) -> None:
-        module = import_module(f"dikbench.solvers.interfaces.warm.{solver.name}_workspace")
-        self._make: type[Workspace] = getattr(module, WORKSPACES[solver.name])
-        self._settings = solver.settings
+        self._make = _maker(solver)
         self._sites: dict[int, tuple[Structure, Workspace]] = {}
 
     def __call__(self, program: QuadraticProgram, site: int) -> Answer:
@@ -58,13 +59,22 @@ class WarmSolver:
                 self._sites[site] = structure, workspace
                 return answer
         try:  # from scratch, without what failed
-            workspace = self._make(program, self._settings)
+            workspace = self._make(program)
         except Exception:
             return Answer(None, claimed=False)
         answer = _solved(workspace, program)
         if answer.claimed:
             self._sites[site] = structure, workspace
         return answer
+
+
+def _maker(solver: Solver) -> Callable[[QuadraticProgram], Workspace]:
+    """Return what allocates the workspace of a program."""
+    if solver.library is not None:
+        return partial(LibraryWorkspace, solver.library)
+    module = import_module(f"dikbench.solvers.interfaces.warm.{solver.name}_workspace")
+    kind: Any = getattr(module, WORKSPACES[solver.name])
+    return partial(kind, settings=solver.settings)
 
 
 def _solved(workspace: Workspace, program: QuadraticProgram) -> Answer:

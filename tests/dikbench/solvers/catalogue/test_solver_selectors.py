@@ -10,10 +10,10 @@ import pytest
 from makers.programs import ACCURACY, INSTALLED, LIBRARIES_WARN, mixture, projection, solve_with
 
 from dikbench.errors import DikbenchError
+from dikbench.solvers.catalogue.back_end import Interface
 from dikbench.solvers.catalogue.back_ends import (
     BACK_ENDS,
     DEFAULT_SOLVER,
-    Interface,
     Solver,
     parse_solver,
     why_not,
@@ -48,7 +48,7 @@ def test_our_own_settings_are_defaults_that_a_user_replaces() -> None:
 @pytest.mark.parametrize(
     ("selector", "message"),
     [
-        ("oqsp", r"unknown solver 'oqsp'; did you mean 'osqp'\? valid: clarabel, daqp"),
+        ("oqsp", r"unknown solver 'oqsp' .*; did you mean 'osqp'\? valid: clarabel, daqp"),
         ("", "not of the form"),
         ("osqp[eps=1e-6]", r"setting of solver osqp 'eps';.* valid: eps_abs, eps_rel, interface"),
         (
