@@ -298,7 +298,7 @@ def _heading(texts: Sequence[tuple[str, float]], scale: alt.Scale) -> Any:
     data = alt.InlineData([{"text": text, "x": place} for text, place in texts])
     return (
         alt.Chart(data)
-        .mark_text(fontSize=12, fontWeight="bold", align="left", baseline="bottom", dy=-5,
+        .mark_text(fontSize=11, fontWeight="bold", align="left", baseline="bottom", dy=-5,
                    color="currentColor")
         .encode(alt.X("x:Q", scale=scale, axis=None), y=alt.value(0), text="text:N")
     )  # fmt: skip

@@ -22,7 +22,7 @@ from dikbench.report.interactive.charts import (
 from dikbench.report.interactive.controls import Control
 from dikbench.report.interactive.page_rows import TOLERANCES_M
 
-WIDTH_PX: Final = 310
+WIDTH_PX: Final = 290
 HEIGHT_PX: Final = 240
 
 _CASE: Final[list[Any]] = ["scenario", "seed", "plant", "reference"]
