@@ -16,7 +16,7 @@ from makers.scenarios import scenario_of
 from dikbench.plugins.building import make_family
 from dikbench.plugins.finding import plugins
 from dikbench.scenario import Case, Claim, Family, Perturbation, Range, Robot, Scenario, Variation
-from dikbench.testing import FAMILY_CHECKS, FamilyCheck, check_family
+from dikbench.testing import FAMILY_CHECKS, FamilyCheck, check_family, parameters
 from dikbench.testing.family import (
     check_family_certificate,
     check_family_deterministic,
@@ -48,7 +48,7 @@ def test_registered_family_keeps_the_contract(
     """Every registered family keeps every clause of the contract; ends of ranges in turns."""
     selector, module = name + REQUIRED.get(name, ""), sys.modules[check.__module__]
     known = {1} if check in MAKE_AGAIN else set()
-    turn, every_end = FAMILIES.index(name) % 5, vars(module)["_ends"]
+    turn, every_end = FAMILIES.index(name) % 5, parameters.ends
 
     def made(family: Family, seed: int) -> Scenario:
         if check in LOOK_ONLY or seed in known:
@@ -57,7 +57,7 @@ def test_registered_family_keeps_the_contract(
         return family.scenario(seed)
 
     monkeypatch.setattr(module, "_scenario", made)
-    monkeypatch.setattr(module, "_ends", lambda of: every_end(of)[turn::5] or every_end(of))
+    monkeypatch.setattr(parameters, "ends", lambda of: every_end(of)[turn::5] or every_end(of))
     check(make_family(selector))
 
 
