@@ -59,7 +59,7 @@ def check_metric_value(metrics: Metrics) -> None:
 def check_metric_worst(metrics: Metrics) -> None:
     """Check that no motion gives a value worse than that of a failed trial."""
     for metric, label, value in _values(metrics):
-        if not isinstance(value, Real):
+        if not isinstance(value, int | float):
             continue
         worse = value > metric.worst if metric.best == "low" else value < metric.worst
         if worse:

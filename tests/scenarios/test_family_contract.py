@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 from makers.scenarios import scenario_of
 
+from dikbench.parameters import Parameter
 from dikbench.plugins.building import make_family
 from dikbench.plugins.finding import plugins
 from dikbench.scenario import Case, Claim, Family, Perturbation, Range, Robot, Scenario, Variation
-from dikbench.testing import FAMILY_CHECKS, FamilyCheck, check_family
+from dikbench.testing import FAMILY_CHECKS, FamilyCheck, check_family, parameters
 from dikbench.testing.family import (
     check_family_certificate,
     check_family_deterministic,
@@ -48,7 +49,7 @@ def test_registered_family_keeps_the_contract(
     """Every registered family keeps every clause of the contract; an end of each range in turns."""
     selector, module = name + REQUIRED.get(name, ""), sys.modules[check.__module__]
     known = {1} if check in MAKE_AGAIN else set()
-    turn, every_end = FAMILIES.index(name), vars(module)["_ends"]
+    turn, every_end = FAMILIES.index(name), parameters.ends
 
     def made(family: Family, seed: int) -> Scenario:
         if check in LOOK_ONLY or seed in known:
@@ -58,11 +59,11 @@ def test_registered_family_keeps_the_contract(
 
     monkeypatch.setattr(module, "_scenario", made)
 
-    def one_end(of: object) -> list[float]:
+    def one_end(of: Parameter) -> list[float]:
         ends = every_end(of)
         return [ends[turn % len(ends)]] if ends else []
 
-    monkeypatch.setattr(module, "_ends", one_end)
+    monkeypatch.setattr(parameters, "ends", one_end)
     check(make_family(selector))
 
 

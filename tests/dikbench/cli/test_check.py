@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from makers.few_states import few_states
 
 from dikbench.cli import commands
 from dikbench.testing import CHECKS, FAMILY_CHECKS
@@ -202,3 +203,22 @@ def test_what_cannot_be_checked_is_one_line(arguments: list[str], words: str) ->
     assert code == 2
     assert len(lines) == 1
     assert words in lines[0]
+
+
+def test_a_file_is_every_plug_in_of_it(plugins_file: Path) -> None:
+    """Each under its name; one that is broken makes the exit code."""
+    with few_states(1, 20):
+        code, lines = checked(str(plugins_file))
+    assert code == 1
+    titles = [line for line in lines if line.endswith(":")]
+    assert titles == [
+        f"{kind} {plugins_file}:{name}:"
+        for kind, name in (
+            ("formulation", "Still"), ("formulation", "Mute"), ("formulation", "Thawed"),
+            ("scenario", "Near"), ("scenario", "Raises"),
+        )
+    ]  # fmt: skip
+    (plugins_file.with_name("empty.py")).write_text("x = 1\n")
+    code, lines = checked(str(plugins_file.with_name("empty.py")))
+    assert code == 2
+    assert "holds nothing to check; valid: a formulation, a scenario family" in lines[0]

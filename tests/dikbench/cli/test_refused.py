@@ -53,7 +53,6 @@ MALFORMED = [
         ("show", "bad.py"),
         ("bad.py names a file without a class; valid: bad.py:Law, bad.py:Thawed, bad.py:Way",),
     ),
-    (("check", "bad.py"), ("valid: bad.py:Law",)),
     (("run", "--scenario", "bad.py"), ("bad.py:Way",)),
     (("run", "--formulation", "bad.py"), ("bad.py:Law",)),
     ((*ON_REACH, "--formulation", "bad.py:Thawed"), ("bad.py:Thawed", "@dataclass(frozen=True)")),
