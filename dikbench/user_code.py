@@ -10,7 +10,8 @@ import importlib.metadata
 import importlib.util
 import os.path
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.metadata import EntryPoint
@@ -205,18 +206,26 @@ def registered(kind: str) -> Mapping[str, Named]:
     return found
 
 
-def add_entry_points(points: Iterable[EntryPoint], folders: Iterable[Path]) -> None:
-    """Have the entry points of a project that need not be installed found, in this process alone.
+@contextmanager
+def entry_points_added(points: Sequence[EntryPoint], folders: Sequence[Path]) -> Iterator[None]:
+    """Have the entry points of a project found that need not be installed, in this process alone.
 
     Args:
         points: its entry points.
         folders: where its modules are.
     """
-    for folder in folders:
-        sys.path.insert(0, str(folder.absolute()))
-    known = {(point.group, point.name, point.value) for point in _OF_PROJECTS}
-    _OF_PROJECTS.extend(p for p in points if (p.group, p.name, p.value) not in known)
+    added = [str(folder.absolute()) for folder in folders]
+    sys.path[:0] = added
+    _OF_PROJECTS.extend(points)
     registered.cache_clear()
+    try:
+        yield
+    finally:
+        for each in added:
+            sys.path.remove(each)
+        for point in points:
+            _OF_PROJECTS.remove(point)
+        registered.cache_clear()
 
 
 def entries_of(table: str, points: Iterable[EntryPoint] | None = None) -> Iterator[Named]:

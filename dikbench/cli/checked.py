@@ -30,8 +30,8 @@ from dikbench.testing.verdicts import (
 from dikbench.user_code import (
     TABLES,
     Kind,
-    add_entry_points,
     entries_of,
+    entry_points_added,
     module_from_file,
     own_names,
 )
@@ -119,10 +119,13 @@ def _of_project(folder: Path, solver: str | None) -> Iterator[Subject]:
     if not ours:
         valid = ", ".join(f"dikbench.{group}" for group in dict.fromkeys(TABLES.values()))
         raise DikbenchError(f"{file}: no entry points of dikbench; valid: {valid}")
-    add_entry_points(ours, [folder / "src", folder])
-    plugins.cache_clear()
-    for kind in IN_WORDS:
-        if any(point.group == f"dikbench.{TABLES[kind]}" for point in ours):
-            for named in entries_of(kind, ours):
-                selector = Selector(named.name)
-                yield f"{kind} {selector}", _verdicts(kind, selector, solver)
+    try:
+        with entry_points_added(ours, [folder / "src", folder]):
+            plugins.cache_clear()
+            for kind in IN_WORDS:
+                if any(point.group == f"dikbench.{TABLES[kind]}" for point in ours):
+                    for named in entries_of(kind, ours):
+                        selector = Selector(named.name)
+                        yield f"{kind} {selector}", _verdicts(kind, selector, solver)
+    finally:
+        plugins.cache_clear()

@@ -141,9 +141,9 @@ def test_rows_that_come_and_go_do_not_break_a_workspace(
     module = importlib.import_module(f"dikbench.solvers.interfaces.warm.{name}_workspace")
     made, workspace = [], getattr(module, WORKSPACES[name])
 
-    def counted(*given: object) -> object:
+    def counted(*given: object, **settings: object) -> object:
         made.append(given)
-        return workspace(*given)
+        return workspace(*given, **settings)
 
     monkeypatch.setattr(module, WORKSPACES[name], counted)
     for interface in ("cold", "warm"):

@@ -55,7 +55,6 @@ def test_a_new_project_is_checked_as_it_is(
     monkeypatch.chdir(tmp_path)
     name = f"untried-{kind}"
     assert in_process("new", kind, name).exit_code == 0
-    monkeypatch.setattr(sys, "path", [*sys.path])
     with few_states(1, 20):
         done = in_process("check", name)
     assert done.exit_code == 0, done.output

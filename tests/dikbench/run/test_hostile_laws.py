@@ -223,4 +223,4 @@ def test_a_law_that_hangs_is_not_timed_and_the_others_are(hung: Path) -> None:
     """The run ends with its report: the timing pass has no limit for a single call."""
     timed = set(pd.read_csv(hung / "out" / "timing.csv")["formulation"])
     assert timed == {good for _, good in pairs_of("", ENDLESS).values()}
-    assert f"not finished after {LIMIT_S:g} s" in (hung / "out" / "report.md").read_text()
+    assert f"not finished after {LIMIT_S:g} s" in (hung / "out" / "report.html").read_text()

@@ -81,7 +81,7 @@ def test_tables_figures_and_manifest_are_written(results: Path) -> None:
     report = (results / "report.md").read_text()
     for name in figures:
         assert name in report
-    assert "proxqp cannot take a linear program" in report
+    assert "proxqp cannot take a linear program" in (results / "report.html").read_text()
 
 
 def test_seeds_differ_and_a_path_indexed_run_waits(results: Path) -> None:
