@@ -8,12 +8,14 @@ from collections.abc import Mapping
 from dataclasses import astuple, fields, is_dataclass
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
+from types import MappingProxyType
+from typing import Any, Final
 
 from dikbench.errors import DikbenchError
 from dikbench.plugins.building import make_formulation, make_plant, scenario_parameters
 from dikbench.plugins.finding import formulation_plugin, plant_plugin, scenario_plugin
 from dikbench.plugins.source import digest, digest_of_file, digest_of_module, source_digest
+from dikbench.problem.progress import CHARACTERISTIC_LENGTH_M
 from dikbench.robots.plugged import EVERY_ROBOT
 from dikbench.scenario.oracle import ORACLES
 from dikbench.scenario.plant import PLANTS
@@ -21,6 +23,12 @@ from dikbench.selector import Selector, parse_selector
 from dikbench.solvers.catalogue.back_ends import Solver, find_back_end, parse_solver
 from dikbench.study.trial import NO_SOLVER, Trial
 from dikbench.user_code import Named, in_file
+
+ADDED: Final[Mapping[str, Any]] = MappingProxyType(
+    {"characteristic_length": CHARACTERISTIC_LENGTH_M}
+)
+"""Parameters that all families got when results were stored already, and what held before: at these
+values ids stay what they were."""
 
 
 def trial_id(trial: Trial) -> str:
@@ -80,7 +88,11 @@ def _formulation(selector: Selector) -> str:
 def scenario_id(selector: Selector) -> str:
     """Return the id of a scenario: family, parameters and source version, without the seed."""
     parameters = scenario_parameters(selector)
-    values = {key: _described(value) for key, value in parameters.items()}
+    values = {
+        key: _described(value)
+        for key, value in parameters.items()
+        if key not in ADDED or value != ADDED[key]
+    }
     robot = parameters["robot"]
     if (in_file(robot) or robot in EVERY_ROBOT) and (found := EVERY_ROBOT.find(robot)) is not None:
         values["robot"] += f" {_source(found)}"
