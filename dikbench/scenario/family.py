@@ -120,8 +120,7 @@ class Family(Parameters, ABC):
         grid: the two parameters of a phase diagram, horizontal and vertical.
         about_position_limits: whether figures show the distance to the position limits.
         tolerance_m, judged, longest_path_run: see `Scenario`.
-        outruns_sampling: whether its speeds may take an exact formulation off the path in a control
-            period, so that the tolerance is raised (see `dikbench.scenario.tolerance`).
+        outruns_sampling: whether speeds raise the tolerance (see `dikbench.scenario.tolerance`).
     """
 
     robot: str = "panda"
