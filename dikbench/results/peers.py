@@ -15,6 +15,7 @@ FILE: Final = "peers.csv"
 KEYS: Final = ("formulation", "peer", "scenario", "solver")
 """Our formulation, the peer, the scenario, our solver: what a row is of."""
 
+# ticks_stable: 1 where the times of both are stable, 0 where not, empty without times.
 COLUMNS: Final = (
     *KEYS,
     "peer_version",
@@ -23,6 +24,7 @@ COLUMNS: Final = (
     "explained_by",
     "our_tick_median_us",
     "peer_tick_median_us",
+    "ticks_stable",
 )
 
 TEXTS: Final = (*KEYS, "peer_version", "explained_by")
@@ -40,6 +42,8 @@ def read_peers(folder: Path) -> pd.DataFrame:
     try:
         found = pd.read_csv(path, dtype=dict.fromkeys(TEXTS, str), keep_default_na=True)
         found[list(TEXTS)] = found[list(TEXTS)].fillna("")
+        if "ticks_stable" not in found:  # written before it was known
+            found["ticks_stable"] = float("nan")
         numbers = [name for name in COLUMNS if name not in TEXTS]
         found[numbers] = found[numbers].astype(float)
         return found[list(COLUMNS)]

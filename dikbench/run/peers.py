@@ -16,6 +16,7 @@ from dikbench.run.trial_row import TrialRow, scenario_of, solve_of
 from dikbench.selector import Selector
 from dikbench.simulation.control_step import TrialEnded, control_step
 from dikbench.simulation.status import Status
+from dikbench.statistics.stability import STABLE
 from dikbench.study.trial import NO_SOLVER
 
 SAME_RAD_S: Final = 1e-6
@@ -112,23 +113,26 @@ def _compared(peer: Any, solve: Any, run: Sequence[tuple[Any, Any]]) -> TrialRow
 def with_ticks(rows: Sequence[TrialRow], times: Sequence[TrialRow]) -> list[TrialRow]:
     """Add the medians of whole ticks [us], kinematics included, to rows of one scenario.
 
+    And whether the times of both are stable.
+
     Args:
         rows: see `compare_with_peers`.
         times: the rows of the timing pass on the scenario.
     """
-    ticks: dict[tuple[str, str], float] = {}
+    ticks: dict[tuple[str, str], tuple[float | None, bool]] = {}
     for row in times:
         if "formulation_time_median_us" in row:
             tick = row["kinematics_time_median_us"] + row["formulation_time_median_us"]
-            ticks[row["formulation"], row["solver"]] = tick
-            ticks.setdefault((row["formulation"], ""), tick)
-    return [
-        {
-            **row,
-            "our_tick_median_us": ticks.get((row["formulation"], row["solver"])),
-            "peer_tick_median_us": ticks.get(
-                (row["peer"], row["solver"]), ticks.get((row["peer"], ""))
-            ),
-        }
-        for row in rows
-    ]
+            timed = tick, row["timing_stability"] == STABLE
+            ticks[row["formulation"], row["solver"]] = timed
+            ticks.setdefault((row["formulation"], ""), timed)
+    none = None, False
+    found = []
+    for row in rows:
+        ours = ticks.get((row["formulation"], row["solver"]), none)
+        theirs = ticks.get((row["peer"], row["solver"]), ticks.get((row["peer"], ""), none))
+        added: TrialRow = {"our_tick_median_us": ours[0], "peer_tick_median_us": theirs[0]}
+        if ours[0] is not None and theirs[0] is not None:
+            added["ticks_stable"] = float(ours[1] and theirs[1])
+        found.append({**row, **added})
+    return found

@@ -22,6 +22,8 @@ from dikbench.problem import (
     Robot,
     Solve,
 )
+from formulations.drake import Drake
+from formulations.peers.early_stop import STOPS_EARLY, may_stop_at, posed
 from formulations.peers.models import (
     TOOL,
     check_same,
@@ -76,8 +78,16 @@ class PeerDrake(Peer):
             return "Drake has no limits of its own"
         if is_outside(problem):
             return "outside position limits Drake returns within one step, or finds nothing"
-        m, n = problem.primary.J.shape
-        return "Drake's OSQP stops early" if n > m else ""
+        J, V = problem.primary.J, problem.primary.V
+        if velocity is None:
+            box = problem.box("one-step")
+            rests = bool((box.lower <= 0.0).all() and (box.upper >= 0.0).all())
+            return "Drake finds nothing, although rest is inside every limit" if rests else ""
+        if J.shape[1] <= len(J):  # CLP's answer, exact
+            return ""
+        progress = float((J @ velocity) @ V / (V @ V)) if V.any() else 0.0
+        program = posed(Drake(centering=self.centering), problem)
+        return STOPS_EARLY if may_stop_at(program, np.append(velocity, progress)) else ""
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

@@ -20,6 +20,8 @@ from dikbench.problem import (
     Robot,
     Solve,
 )
+from formulations.drake_system import DrakeSystem
+from formulations.peers.early_stop import STOPS_EARLY, may_stop_at, posed
 from formulations.peers.models import TOOL, coordinates, position_limits, urdf_of, velocity_limits
 from formulations.peers.peer import WITH_DRAKE, Peer, Whose, postures_of
 from formulations.peers.peer_drake import PlantOfRobot
@@ -70,7 +72,10 @@ class PeerDrakeSystem(Peer):
         """See `Peer`."""
         if self.limits == "own" and not as_modelled(problem, velocity=True):
             return "Drake's own limits are those of the model"
-        return "Drake's OSQP stops early"
+        if velocity is None:
+            return ""
+        ours = DrakeSystem(tracking_weight=self.tracking_weight, centering=self.centering)
+        return STOPS_EARLY if may_stop_at(posed(ours, problem), velocity) else ""
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""

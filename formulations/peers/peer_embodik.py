@@ -4,16 +4,24 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, ClassVar, Final
 
+import msgspec
 import numpy as np
 
-from dikbench.errors import SolverFailed
-from dikbench.problem import Array, DikProblem, LimitKind, Robot, Solve
+from dikbench.errors import CannotAnswer, SolverFailed
+from dikbench.problem import (
+    Array,
+    DikProblem,
+    LimitKind,
+    LinearizedJointTask,
+    Robot,
+    Solve,
+)
 from formulations.peers.models import (
     TOOL,
     UNLIMITED,
@@ -21,8 +29,15 @@ from formulations.peers.models import (
     position_limits,
     urdf_of,
 )
-from formulations.peers.peer import WITH_PEERS, Peer, Whose, postures_of
+from formulations.peers.peer import WITH_PEERS, Peer, Whose
 from formulations.peers.same_limits import as_modelled
+from formulations.sns import SaturationInNullSpace
+
+SAME_RAD_S: Final = 1e-6
+"""Velocities that differ by less are the same."""
+
+NEARLY_NONE: Final = 1e-3
+"""A smaller share of a task is almost none of it."""
 
 UNDAMPED: Final = 1e-9
 """Singular values below this are damped where damping is to be none."""
@@ -65,12 +80,34 @@ class PeerEmbodik(Peer):
         """See `Peer`."""
         if self.limits == "own" and not as_modelled(problem, velocity=True):
             return "EmbodiK's own limits are those of the model"
+        try:
+            return "" if velocity is None else self._causes(problem, velocity)
+        except CannotAnswer:
+            return ""
+
+    def _causes(self, problem: DikProblem, velocity: Array) -> str:
+        """Say what its velocity owes to damping, to being asked for one task, and to its scale.
+
+        Raises:
+            CannotAnswer: if it has no velocity without damping, or ours has none.
+        """
+        causes, undamped = [], velocity
         if self.damping == "own":
-            return "EmbodiK damps singular values near 0.1"
-        alone = (
-            "EmbodiK is asked for the first task alone, " if postures_of(problem) else "EmbodiK "
-        )
-        return f"{alone}scales it before it has used all joints, or leaves it"
+            undamped = replace(self, damping="ours").velocity(problem, _unused)
+            if _apart(undamped, velocity):
+                causes.append("damps singular values near 0.1")
+        ours = SaturationInNullSpace()
+        if _apart(undamped, ours.velocity(problem, _unused)):
+            alone = [task for task in problem.tasks if not isinstance(task, LinearizedJointTask)]
+            first = ours.velocity(msgspec.structs.replace(problem, tasks=alone), _unused)
+            if len(alone) < len(problem.tasks):
+                causes.append("is asked for the first task alone")
+            if _apart(undamped, first):
+                scaled = _how_scaled(problem, undamped, first)
+                if not scaled:
+                    return ""
+                causes.append(scaled)
+        return f"EmbodiK {' and '.join(causes)}" if causes else ""
 
     def velocity(self, problem: DikProblem, solve: Solve) -> Array:
         """See `Formulation`."""
@@ -84,6 +121,36 @@ class PeerEmbodik(Peer):
             raise SolverFailed(f"EmbodiK: {found.status.name}")
         v: Array = np.array(found.joint_velocities)
         return v
+
+
+def _unused(*_: Any) -> Any:
+    """Stand for the solver of those that have none."""
+    raise AssertionError("no program is posed")
+
+
+def _apart(one: Array, other: Array) -> bool:
+    """Say whether two velocities (nv,) are different ones."""
+    return bool(np.abs(one - other).max() > SAME_RAD_S)
+
+
+def _how_scaled(problem: DikProblem, velocity: Array, first: Array) -> str:
+    """Say how a velocity makes less of the first task than ours, (nv,), or leaves it; or "".
+
+    Both go along V, theirs less far; or no scale fits, so that ours rests: then theirs leaves V,
+    or turns joints for less than `NEARLY_NONE` of it.
+    """
+    J, V = problem.primary.J, problem.primary.V
+    theirs, ours = J @ velocity, J @ first
+    square = float(V @ V)
+    scale, most = (float(made @ V) / square if square else 0.0 for made in (theirs, ours))
+    along, rests = not _apart(theirs, scale * V), not _apart(ours, np.zeros_like(ours))
+    if along and scale < most:
+        return "scales it before it has used all joints"
+    if rests and not along:
+        return "leaves it where no scale fits"
+    if rests and scale < NEARLY_NONE:
+        return "turns joints for almost none of it where ours rests"
+    return ""
 
 
 class _Embodik:

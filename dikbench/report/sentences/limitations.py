@@ -12,6 +12,7 @@ import pandas as pd
 
 from dikbench.arrays import Mask
 from dikbench.plugins.finding import plugins
+from dikbench.report.sentences.peers_alone import without_counterpart
 from dikbench.report.sentences.words import NOT_TIMED, listed, number, quoted, several
 from dikbench.scenario.oracle import ORACLE, ORACLES
 from dikbench.scenario.plant import PLANTS, REFERENCE_MODES
@@ -67,6 +68,7 @@ def limitations(
     found += _broken(trials)
     found += _steps(trials)
     found += _not_rechecked(trials)
+    found += _not_compared(trials)
     found += _not_run(trials)
     return found
 
@@ -286,6 +288,20 @@ def _not_rechecked(trials: pd.DataFrame) -> list[Limitation]:
         "that solves a program itself can hand it over (`solve.verify`)."
     )
     return [Limitation(text, (f"{listed(names, most=None)}.",))] if names else []
+
+
+def _not_compared(trials: pd.DataFrame) -> list[Limitation]:
+    """Peers whose velocities are compared with nothing."""
+    ran = trials.loc[trials["status"] != SKIPPED, "formulation"]
+    cases = [
+        f"{quoted(peer)}: add {quoted(counterpart)}."
+        for peer, counterpart in without_counterpart(list(dict.fromkeys(ran))).items()
+    ]
+    text = (
+        "Other libraries whose velocities are compared with nothing: the formulation of ours that "
+        "is to answer alike is not in the run."
+    )
+    return [Limitation(text, tuple(cases))] if cases else []
 
 
 def _not_run(trials: pd.DataFrame) -> list[Limitation]:

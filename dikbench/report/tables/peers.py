@@ -13,7 +13,7 @@ NOTE: Final = (
     "difference is the largest of any joint at any step; where it is above 1e-6 rad/s the reasons "
     "stand beside it. Ticks are whole: kinematics, posing and solving, medians over scenarios of "
     "medians, timed in the same rounds; the ratio is ours over the peer's, below 1 where ours is "
-    "faster."
+    "faster; on scenarios where the times of either are not stable it is rough."
 )
 
 AGREEMENT: Final = (
@@ -34,6 +34,7 @@ COST: Final = (
     "our_tick_median_us",
     "peer_tick_median_us",
     "ratio",
+    "stable",
 )
 
 _COUNT: Final = re.compile(r" \(\d+ steps\)")
@@ -63,6 +64,7 @@ def peers_table(rows: pd.DataFrame) -> pd.DataFrame:
                 "our tick [us]": part["our_tick_median_us"].median(),
                 "its tick [us]": part["peer_tick_median_us"].median(),
                 "ratio": part["ratio"].median(),
+                "stable": f"{int(part['ticks_stable'].sum())} of {part['ratio'].notna().sum()}",
             }
         )
     return pd.DataFrame(found)
@@ -76,6 +78,7 @@ def write_peers_tables(rows: pd.DataFrame, folder: Path) -> None:
     told = _with_ratio(rows).astype({"steps": int})
     told[list(AGREEMENT)].to_csv(folder / "peer_agreement.csv", index=False)
     timed = told[told["ratio"].notna()]
+    timed = timed.assign(stable=timed["ticks_stable"].map({1.0: "yes", 0.0: "no"}))
     timed[list(COST)].to_csv(folder / "peer_cost.csv", index=False, float_format="%.4g")
 
 

@@ -11,6 +11,7 @@ import pytest
 from makers.runs import run_here, without_figures
 from makers.scenarios import error_of
 
+from dikbench.report.sentences.peers_alone import without_counterpart
 from dikbench.report.tables.peers import peers_table, write_peers_tables
 from dikbench.report.write import write_report
 from dikbench.results.peers import COLUMNS, FILE, read_peers, write_peers
@@ -102,19 +103,29 @@ def test_steps_without_an_answer_are_counted_apart(other: str) -> None:
     assert some["explained_by"] == f"no answer: it is silent ({silent} steps)"
 
 
-def test_ticks_are_whole() -> None:
-    """Kinematics are added; a peer's own are in its call, so that none are."""
+@pytest.mark.parametrize("stability", ["stable", "drift: ..."])
+def test_ticks_are_whole(stability: str) -> None:
+    """Kinematics are added; a peer's own are in its call, so that none are; both are stable."""
     times: list[dict[str, Any]] = [
         {"formulation": "a", "solver": "daqp", "kinematics_time_median_us": 10.0,
-         "formulation_time_median_us": 20.0},
+         "formulation_time_median_us": 20.0, "timing_stability": "stable"},
         {"formulation": "peer", "solver": "none", "kinematics_time_median_us": 0.0,
-         "formulation_time_median_us": 90.0},
+         "formulation_time_median_us": 90.0, "timing_stability": stability},
         {"formulation": "refused", "solver": "none"},
     ]  # fmt: skip
     (row,) = with_ticks([{"formulation": "a", "solver": "daqp", "peer": "peer"}], times)
     assert (row["our_tick_median_us"], row["peer_tick_median_us"]) == (30.0, 90.0)
+    assert row["ticks_stable"] == (stability == "stable")
     (row,) = with_ticks([{"formulation": "a", "solver": "daqp", "peer": "refused"}], times)
     assert row["peer_tick_median_us"] is None
+    assert "ticks_stable" not in row
+
+
+def test_a_peer_that_is_compared_with_nothing_is_named(other: str) -> None:
+    """With the formulation to add, however it is written there; one that is gone is passed over."""
+    assert without_counterpart([other, "pinv", "gone.py:Law"]) == {other: "dls[damping=0.1]"}
+    assert without_counterpart([other, "dls[damping=0.10]"]) == {}
+    assert without_counterpart(["dls", "pinv"]) == {}
 
 
 def rows(difference: float) -> list[dict[str, object]]:
@@ -124,7 +135,7 @@ def rows(difference: float) -> list[dict[str, object]]:
             "formulation": "dls", "peer": "peer", "scenario": "reach", "solver": "none",
             "peer_version": "1.0", "steps": 7, "velocity_difference_max_rad_s": difference,
             "explained_by": "it is loose (2 steps)", "our_tick_median_us": 5.0,
-            "peer_tick_median_us": 10.0,
+            "peer_tick_median_us": 10.0, "ticks_stable": 1.0 if difference < 2 else 0.0,
         }
     ]  # fmt: skip
 
@@ -150,11 +161,13 @@ def test_tables_of_peers(tmp_path: Path) -> None:
     (row,) = peers_table(frame).to_dict("records")
     assert (row["scenarios"], row["steps"], row["why"]) == (2, 14, "it is loose")
     assert (row["largest difference [rad/s]"], row["ratio"]) == (2.0, 0.5)
+    assert row["stable"] == "1 of 2"
     write_peers_tables(frame.iloc[:0], tmp_path / "none")
     assert not (tmp_path / "none").exists()
     write_peers_tables(frame, tmp_path / "tables")
     cost = pd.read_csv(tmp_path / "tables" / "peer_cost.csv")
     assert cost["ratio"].tolist() == [0.5, 0.5]
+    assert cost["stable"].tolist() == ["yes", "no"]
     agreement = pd.read_csv(tmp_path / "tables" / "peer_agreement.csv")
     assert agreement["explained_by"].tolist() == ["it is loose (2 steps)"] * 2
     assert agreement["steps"].tolist() == [7, 7]

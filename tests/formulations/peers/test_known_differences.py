@@ -203,6 +203,7 @@ def test_drakes_osqp_stops_early_where_its_function_differs() -> None:
                 continue
             differing += 1
             assert "OSQP" in theirs.known_difference(problem, v)
+            assert theirs.known_difference(problem, 0.5 * expected) == ""
             J, wanted = problem.primary.J, problem.primary.V
             kernel = lu_kernel(np.roll(J, 3, axis=0))
             pull = centering * problem.tasks[1].error
@@ -237,6 +238,10 @@ def test_drakes_system_stops_early(name: str) -> None:
             continue
         differing += 1
         assert system_cost(problem, expected) < system_cost(problem, v)
+        assert "OSQP" in theirs.known_difference(problem, v)
+        # Answers to other problems are not explained so: one of half the speed, one of none.
+        for other in (0.5 * expected, 0 * expected, -v):
+            assert theirs.known_difference(problem, other) == ""
     assert 10 < differing < 50
 
 
@@ -267,7 +272,8 @@ def test_embodik_scales_before_it_has_used_all_joints() -> None:
         least, box = np.linalg.pinv(J) @ V, problem.box("one-step")
         assert its <= ours + 1e-9
         assert ((least > box.upper) | (least < box.lower)).any()  # joints have to be held
-        assert "scales" in theirs.known_difference(problem, None)
+        assert theirs.known_difference(problem, v).startswith("EmbodiK scales")
+        assert theirs.known_difference(problem, expected) == ""
     assert differing > 5
 
 
@@ -284,6 +290,9 @@ def test_embodik_leaves_the_task_where_no_scale_fits() -> None:
     achieved = problem.primary.J @ v
     assert np.linalg.norm(achieved) > 0.01
     assert achieved @ V < 0.999 * np.linalg.norm(achieved) * np.linalg.norm(V)
+    assert "leaves it" in peer("peer-embodik[limits=ours,damping=ours]").known_difference(
+        problem, v
+    )
 
 
 def test_embodik_damps_where_no_singularity_is_near() -> None:
@@ -291,6 +300,11 @@ def test_embodik_damps_where_no_singularity_is_near() -> None:
     robot = load_robot("panda")
     problem = asked(robot, robot.q0, np.zeros(7), np.full(6, 0.05), posture=False)
     expected = velocity("sns", problem)
-    assert np.abs(velocity(peer("peer-embodik"), problem) - expected).max() > 1e-3
+    own = peer("peer-embodik")
+    v = velocity(own, problem)
+    assert np.abs(v - expected).max() > 1e-3
+    assert own.known_difference(problem, v) == "EmbodiK damps singular values near 0.1"
+    both = asked(robot, robot.q0, np.zeros(7), np.full(6, 0.05))
+    assert own.known_difference(both, v).endswith("and is asked for the first task alone")
     told = velocity(peer("peer-embodik[damping=ours]"), problem)
     assert told == pytest.approx(expected, abs=1e-9)
