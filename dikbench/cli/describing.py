@@ -25,6 +25,7 @@ from dikbench.plugins.finding import (
     plugins,
     scenario_plugin,
 )
+from dikbench.published.experiment import load_experiment, published_experiments
 from dikbench.report.tables.every import tables_with
 from dikbench.robots.plugged import EVERY_ROBOT
 from dikbench.scenario.oracle import ORACLES
@@ -114,6 +115,8 @@ def _without_parameters(name: str) -> str:
         study = load_study(name)
         path = shipped_studies().get(name, name)
         return f"# {study.name} ({path})\n\n{Path(path).read_text(encoding='utf-8')}"
+    if name in published_experiments():
+        return _published(name)
     every = [
         *formulations_and_peers(),
         *plugins("scenario"),
@@ -121,8 +124,32 @@ def _without_parameters(name: str) -> str:
         *plugins("plant"),
         *EVERY_ROBOT.names(),
         *EVERY_METRIC.names(),
+        *published_experiments(),
     ]
     raise unknown("name", name, [*every, *shipped_studies()], every="dikbench list")
+
+
+def _published(name: str) -> str:
+    """Describe a published experiment: its source, what is done, its rows, what is known of it."""
+    experiment = load_experiment(name)
+    rows = [
+        f"  {row.name}: {row.formulation or f'not covered: {row.not_covered}'}"
+        for row in experiment.rows
+    ]
+    return "\n".join(
+        [
+            f"{name}: {experiment.title}",
+            f"source: {experiment.source}",
+            "",
+            *(inspect.getdoc(type(experiment.protocol)) or "").splitlines(),
+            "",
+            "Rows, each with our formulation:",
+            *rows,
+            *(text for note in experiment.notes for text in ("", note)),
+            "",
+            f"It is run by: dikbench reproduce {name}",
+        ]
+    )
 
 
 def _described(plugin: Plugin, selector: Selector, *, scenario: bool = False) -> str:

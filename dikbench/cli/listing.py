@@ -52,10 +52,16 @@ def _formulations() -> list[tuple[str, str, str]]:
         ),
         *((name, summary, "") for name, summary in ORACLE_SUMMARIES.items()),
         *(
-            (peer.name, peer.summary.rstrip("."), not_installed(peer.factory) or peer.source)
+            (peer.name, peer.summary.rstrip("."), _how_to_install(peer) or peer.source)
             for peer in plugins("peer").values()
         ),
     ]
+
+
+def _how_to_install(peer: Plugin) -> str:
+    """Say in brackets how the library of a peer is installed; or nothing, where it is."""
+    missing = not_installed(peer.factory)
+    return f"[{missing}]" if missing else ""
 
 
 def _scenarios() -> list[tuple[str, str, str]]:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from typing import Final
 
 import click
 
 from dikbench.cli.one_line_errors import one_line_errors
+
+EXIT_CODE_OF_NOTHING_MEASURED: Final = 3
 
 
 @click.command()
@@ -28,10 +32,11 @@ def reproduce(names: tuple[str, ...], out: Path | None, jobs: int | None) -> Non
     """Run published experiments again with the formulations here, published beside measured.
 
     NAME is one of `dikbench list published`; default: all of them, in minutes. Every row has a
-    verdict: equal, inside noise, not reproduced, or not covered and why. Targets and starts are
-    drawn with the seeds of the sources.
+    verdict, which the last lines explain. Targets and starts are drawn with the seeds of the
+    sources. The exit code is 3 where nothing could be measured.
     """
     from dikbench.errors import DikbenchError
+    from dikbench.published.experiment import published_experiments
     from dikbench.published.reproducing import (
         EXPLANATION,
         as_markdown,
@@ -43,10 +48,17 @@ def reproduce(names: tuple[str, ...], out: Path | None, jobs: int | None) -> Non
 
     if out is not None and not out.parent.is_dir():
         raise DikbenchError(f"--out {out}: no such folder: {out.parent}; valid: one that exists")
-    found = reproduce(names, jobs or available_cores())
-    for name, rows in found.items():
+    found = {}
+    for name, rows in reproduce(names, jobs or available_cores()):
         click.echo(as_markdown(name, rows) + "\n")
+        found[name] = rows
     click.echo(f"{EXPLANATION}\n\n{summary(found)}")
     if out is not None:
-        out.write_text(whole_page(found), encoding="utf-8")
+        ordered = {name: found[name] for name in (names or published_experiments())}
+        try:
+            out.write_text(whole_page(ordered), encoding="utf-8")
+        except OSError as error:
+            raise DikbenchError(f"--out {out}: {error.strerror or error}") from None
         click.echo(f"\n{out}")
+    if all(each.measured is None for rows in found.values() for each in rows):
+        sys.exit(EXIT_CODE_OF_NOTHING_MEASURED)

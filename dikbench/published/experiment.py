@@ -53,6 +53,9 @@ class Row(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         published: what was printed, by the names of the protocol's statistics; empty for a row of
             our own beside the table.
         settings: of the protocol, where they are not those of the experiment.
+        rival: another formulation, the nearest without what the row is about: the verdict says
+            whether the row distinguishes the two.
+        fitted: whether settings were searched for until the numbers came out.
         not_covered: why the row cannot be measured here.
     """
 
@@ -60,6 +63,8 @@ class Row(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     formulation: str = ""
     published: Mapping[str, float] = {}
     settings: Mapping[str, Any] = {}
+    rival: str = ""
+    fitted: bool = False
     not_covered: str = ""
 
 
@@ -72,6 +77,8 @@ class Experiment(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         protocol: what is done, and its settings.
         rows: of the published table.
         notes: what is known about it, a paragraph each.
+        statements: whether what was published are statements, no numbers: the numbers of its rows
+            are what the statements say.
     """
 
     title: str
@@ -79,16 +86,18 @@ class Experiment(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     protocol: Protocol
     rows: tuple[Row, ...]
     notes: tuple[str, ...] = ()
+    statements: bool = False
 
     @property
     def statistics(self) -> Mapping[str, Statistic]:
         """The columns of the table, by name."""
         return self.protocol.statistics
 
-    def measure(self, row: Row) -> dict[str, Measured]:
-        """Measure one row with our formulation."""
+    def measure(self, row: Row) -> tuple[dict[str, Measured], dict[str, Measured] | None]:
+        """Measure one row with our formulation, and with its rival if it has one."""
         settings = msgspec.structs.replace(self.protocol, **row.settings)
-        return settings.measure(row.formulation)
+        measured = settings.measure(row.formulation)
+        return measured, settings.measure(row.rival) if row.rival else None
 
 
 def published_experiments() -> Mapping[str, Path]:

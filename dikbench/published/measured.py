@@ -11,6 +11,10 @@ import numpy as np
 
 from dikbench.arrays import Array, Mask
 
+EQUAL: Final = "equal"
+INSIDE_NOISE: Final = "inside noise"
+NOT_REPRODUCED: Final = "not reproduced"
+
 DEVIATIONS: Final = 2.0
 """Half of a noise band, in standard errors."""
 
@@ -108,7 +112,7 @@ def verdict(
         return "ours"
     differing = [name for name in published if _differs(statistics, name, published, measured)]
     if not differing:
-        return "equal"
+        return EQUAL
     outside = [
         name
         for name in differing
@@ -116,8 +120,8 @@ def verdict(
         and not measured[name].low <= published[name] <= measured[name].high
     ]
     if not outside:
-        return "inside noise"
-    return f"not reproduced: {', '.join(statistics[name].heading for name in outside)}"
+        return INSIDE_NOISE
+    return f"{NOT_REPRODUCED}: {', '.join(statistics[name].heading for name in outside)}"
 
 
 def _differs(
