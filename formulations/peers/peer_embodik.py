@@ -39,6 +39,9 @@ SAME_RAD_S: Final = 1e-6
 NEARLY_NONE: Final = 1e-3
 """A smaller share of a task is almost none of it."""
 
+NO_SOLVER: Final[Any] = None
+"""In place of the solver of formulations that have no program."""
+
 UNDAMPED: Final = 1e-9
 """Singular values below this are damped where damping is to be none."""
 
@@ -93,13 +96,13 @@ class PeerEmbodik(Peer):
         """
         causes, undamped = [], velocity
         if self.damping == "own":
-            undamped = replace(self, damping="ours").velocity(problem, _unused)
+            undamped = replace(self, damping="ours").velocity(problem, NO_SOLVER)
             if _apart(undamped, velocity):
                 causes.append("damps singular values near 0.1")
         ours = SaturationInNullSpace()
-        if _apart(undamped, ours.velocity(problem, _unused)):
+        if _apart(undamped, ours.velocity(problem, NO_SOLVER)):
             alone = [task for task in problem.tasks if not isinstance(task, LinearizedJointTask)]
-            first = ours.velocity(msgspec.structs.replace(problem, tasks=alone), _unused)
+            first = ours.velocity(msgspec.structs.replace(problem, tasks=alone), NO_SOLVER)
             if len(alone) < len(problem.tasks):
                 causes.append("is asked for the first task alone")
             if _apart(undamped, first):
@@ -121,11 +124,6 @@ class PeerEmbodik(Peer):
             raise SolverFailed(f"EmbodiK: {found.status.name}")
         v: Array = np.array(found.joint_velocities)
         return v
-
-
-def _unused(*_: Any) -> Any:
-    """Stand for the solver of those that have none."""
-    raise AssertionError("no program is posed")
 
 
 def _apart(one: Array, other: Array) -> bool:

@@ -76,7 +76,7 @@ def test_the_versions_are_the_tested_ones() -> None:
 def test_a_command_prints_what_is_written(heading: str) -> None:
     """But for the rows of packages that are not installed."""
     (name,) = COMMAND.findall(findings()[heading])
-    (found,) = reproduce([name], 1).values()
+    ((_, found),) = reproduce([name], 1)
     printed = rows(as_markdown(name, found))
     for here, row, written in zip(found, printed, rows(findings()[heading]), strict=True):
         assert row == written or "not installed" in here.verdict

@@ -112,6 +112,8 @@ def test_a_search_ends_where_steps_run_away() -> None:
 def test_rows_that_no_rounding_decides_are_equal(experiment: str, row: str) -> None:
     """Every printed number of 10 000 searches, of both arms."""
     published = load_experiment(experiment)
-    (found,) = [each for each in published.rows if each.name == row]
-    measured = published.measure(found)
+    (found,) = [
+        msgspec.structs.replace(each, rival="") for each in published.rows if each.name == row
+    ]
+    measured, _ = published.measure(found)
     assert verdict(published.statistics, found.published, measured) == "equal"
