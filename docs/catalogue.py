@@ -29,7 +29,7 @@ GIVEN: Final = {"csv": "csv[file=teleoperation]"}
 
 
 def prose(text: str) -> str:
-    """Write a text of a docstring in Markdown: symbols mean themselves, keys of papers are links."""
+    """Write a docstring's text in Markdown: symbols mean themselves, keys of papers are links."""
     pieces = re.split(r"(`[^`]*`)", text)
     for number in range(0, len(pieces), 2):
         escaped = re.sub(r"([\\*_<>|$~^#])", r"\\\1", pieces[number])
