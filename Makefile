@@ -26,7 +26,7 @@ contract:        ## the contract suite against the built wheel, outside the chec
 	tests/wheel_contract.sh
 
 docs:            ## the site, readable offline, in docs/_build/html (warnings are errors)
-	$(PYTHON) -m pip install --quiet -c constraints.txt -e ".[docs]" && $(PYTHON) -m sphinx -W --keep-going -q docs docs/_build/html
+	$(PYTHON) -m pip install --quiet -c constraints.txt -e ".[docs]" && $(PYTHON) -m sphinx -E -a -W --keep-going -q docs docs/_build/html
 
 quick:           ## the default study
 	.venv/bin/dikbench run

@@ -13,13 +13,15 @@ import click
 from dikbench.cli import commands
 from dikbench.cli.describing import description
 from dikbench.cli.listing import direction
-from dikbench.metrics import METRICS
+from dikbench.metrics import METRICS, OUTCOME_SENTENCES
 from dikbench.plugins.building import make_scenario
 from dikbench.plugins.finding import Plugin, plugins
 from dikbench.problem.problem import is_batched, is_strict, program_of, promises_of, sight_of
 from dikbench.report.contents.docstring import Docstring, parse_docstring
 from dikbench.robots.plugged import EVERY_ROBOT
+from dikbench.scenario.plant import PLANTS
 from dikbench.solvers.catalogue.back_ends import SOLVERS
+from dikbench.study.study import shipped_studies
 
 CHECKOUT: Final = Path(__file__).parents[1]
 REFERENCES: Final = CHECKOUT / "formulations" / "REFERENCES.md"
@@ -152,6 +154,12 @@ def metrics() -> str:
     return table(("metric", "unit", "better", "worst", "what it is", "source"), rows)
 
 
+def outcomes() -> str:
+    """Write the table of outcomes, in the order in which they are asked for."""
+    rows = [(f"`{each.value}`", prose(text)) for each, text in OUTCOME_SENTENCES.items()]
+    return table(("outcome", "when"), rows)
+
+
 def described(names: Iterable[str]) -> str:
     """Write what `dikbench show` prints of things, a section each."""
     return "\n\n".join(
@@ -178,6 +186,9 @@ PAGES: Final[Mapping[str, Callable[[], str]]] = MappingProxyType(
         "every-formulation": formulations,
         "every-scenario": scenarios,
         "every-metric": metrics,
+        "every-outcome": outcomes,
+        "every-plant": lambda: described(PLANTS),
+        "every-study": lambda: described(shipped_studies()),
         "every-solver": lambda: described(SOLVERS.names()),
         "every-robot": lambda: described(EVERY_ROBOT.names()),
         "every-command": command_line,

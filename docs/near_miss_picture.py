@@ -105,11 +105,21 @@ def draw(file: Path) -> None:
     figure, axes = plt.subplots(
         2, len(found), figsize=(8.4, 3.7), dpi=100, height_ratios=(2.6, 1), sharey="row"
     )
-    figure.subplots_adjust(left=0.055, right=0.995, top=0.87, bottom=0.115, wspace=0.06, hspace=0.1)
+    figure.subplots_adjust(left=0.055, right=0.995, top=0.92, bottom=0.115, wspace=0.06, hspace=0.1)
     moving = []
     for (name, run), (view, chart) in zip(found.items(), axes.T, strict=True):
         colour = COLOURS[name]
-        view.set_title(f"$\\bf{{{name}}}$\n{run.said}", color=colour, fontsize=9)
+        view.set_title(run.said, color=colour, fontsize=9)
+        view.text(
+            0.03,
+            0.96,
+            name,
+            color=colour,
+            weight="bold",
+            size=11,
+            va="top",
+            transform=view.transAxes,
+        )
         view.plot(*(wanted @ plane.T).T, color="0.65", lw=5, solid_capstyle="round", zorder=0)
         view.set(
             xticks=[], yticks=[], aspect="equal", xlim=middle[0] + np.array([-0.2, 0.2]),

@@ -76,8 +76,8 @@ results = dikbench.run_study(
     jobs=1,
     report=False,
 )
-columns = ["formulation", "outcome", "velocity_peak_ratio", "contour_error_6d_max_m", "slow_down"]
-print(results.trials[columns].to_string(index=False))
+columns = ["formulation", "outcome", "velocity_peak_ratio", "slow_down"]
+print(results.trials[columns].round(3).to_string(index=False))
 
 # %% [markdown]
 # `dikbench check my_law.py:ErrorDamped` says which promises it keeps, a line each; in your own
