@@ -10,7 +10,7 @@ from pathlib import Path
 import dikbench
 from dikbench.testing import check_formulation
 
-Path("my_law.py").write_text(
+Path("error_damped.py").write_text(
     '''
 from dataclasses import dataclass
 from typing import Annotated
@@ -37,7 +37,7 @@ class ErrorDamped(Parameters):
 ''',
     encoding="utf-8",
 )
-LAW = "my_law.py:ErrorDamped"
+LAW = "error_damped.py:ErrorDamped"
 
 # %% [markdown]
 # One step at a prompt, where `print` and a debugger work:
@@ -80,8 +80,8 @@ columns = ["formulation", "outcome", "velocity_peak_ratio", "slow_down"]
 print(results.trials[columns].round(3).to_string(index=False))
 
 # %% [markdown]
-# `dikbench check my_law.py:ErrorDamped` says which promises it keeps, a line each; in your own
-# tests it is a function, which raises where one is broken. It takes a minute.
+# `dikbench check error_damped.py:ErrorDamped` says which promises it keeps, a line each; in
+# your own tests it is a function, which raises where one is broken. It takes a minute.
 
 # %%
 print(check_formulation.__doc__.splitlines()[0])
