@@ -111,3 +111,15 @@ def test_every_link_of_the_pages_leads_somewhere() -> None:
         for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
             if "://" not in target:
                 assert (page.parent / target).exists(), f"{page}: {target}"
+
+
+def test_its_map_is_that_of_the_rooms() -> None:
+    """In the order in which they may import; the page of the map has a line for each."""
+    listed = re.search(r"^dikbench/ +(.*?):", TEXT, re.M | re.S)
+    assert listed is not None
+    rooms = re.findall(r"\w+", listed[1])
+    page = (CHECKOUT / "docs" / "explanation" / "map.md").read_text(encoding="utf-8")
+    assert re.findall(r"^  (\w+)/ ", page, re.M) == rooms
+    assert set(rooms) == {
+        each.name for each in (CHECKOUT / "dikbench").iterdir() if (each / "__init__.py").is_file()
+    }
