@@ -37,9 +37,9 @@ def tried(dampings, scenario, seeds):
 # the one it loses in the other.
 
 # %%
-DAMPINGS = [0.01, 0.03, 0.1, 0.3]
+DAMPINGS = [0.01, 0.03, 0.1]
 SCENARIO = "near-miss[robot=ur5,singularity=elbow,miss=0.005|0.02,speed=0.3]"
-train = tried(DAMPINGS, SCENARIO, [1, 2, 3])
+train = tried(DAMPINGS, SCENARIO, [1, 2])
 summary = train.groupby("formulation_damping").agg(
     trials=("outcome", "size"),
     done=("outcome", lambda outcomes: (outcomes == "success").mean()),
@@ -54,7 +54,7 @@ print(summary.round(2).to_string())
 
 # %%
 best = summary.sort_values(["done", "away_mm"], ascending=[False, True]).index[0]
-test = tried([best], SCENARIO, [11, 12, 13])
+test = tried([best], SCENARIO, [11, 12])
 print(f"damping {best}: {summary.loc[best, 'done']:.2f} of the trials that chose it,")
 print(f"{(test['outcome'] == 'success').mean():.2f} of {len(test)} that did not")
 
