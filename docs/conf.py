@@ -17,6 +17,7 @@ source_suffix = {".md": "markdown", ".py": "notebook"}
 myst_enable_extensions = ["attrs_block"]
 myst_heading_anchors = 3
 
+highlight_language = "none"
 default_role = "code"
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
