@@ -45,6 +45,9 @@ def findings_table() -> str:
         f"| formulation | {' | '.join(SITUATIONS.values())} |",
         "|---|" + "---:|" * len(SITUATIONS),
     ]
+    missing = {*FORMULATIONS} - {*rates.index.get_level_values("formulation")}
+    if missing:
+        raise SystemExit(f"{SUCCESS}: no row of {', '.join(sorted(missing))}; name others here")
     for name in FORMULATIONS:
         rows = [rates.loc[(name, how)] for how in REFERENCES]
         cells = [" / ".join(_rate(row, key) for row in rows) for key in SITUATIONS]
