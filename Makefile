@@ -25,6 +25,9 @@ format:          ## mend the format
 contract:        ## the contract suite against the built wheel, outside the checkout
 	tests/wheel_contract.sh
 
+docs:            ## the site, readable offline, in docs/_build/html (warnings are errors)
+	$(PYTHON) -m pip install --quiet -c constraints.txt -e ".[docs]" && $(PYTHON) -m sphinx -E -a -W --keep-going -q docs docs/_build/html
+
 quick:           ## the default study
 	.venv/bin/dikbench run
 
@@ -54,4 +57,4 @@ benchmark-peers: ## whole ticks and velocities of other libraries beside ours (m
 constraints:     ## the installed versions become the tested ones (of peers too: `make benchmark-peers` first)
 	.venv/bin/pip freeze --exclude-editable --exclude pip --exclude setuptools > constraints.txt
 
-.PHONY: help setup test test-long test-random lint format contract quick benchmark benchmark-scenarios benchmark-solvers benchmark-laws benchmark-metrics benchmark-peers mutation constraints
+.PHONY: help setup test test-long test-random lint format contract docs quick benchmark benchmark-scenarios benchmark-solvers benchmark-laws benchmark-metrics benchmark-peers mutation constraints

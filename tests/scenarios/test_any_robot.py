@@ -1,4 +1,4 @@
-"""Robots that no family knows: what a URDF can do is what README.md says, and is what it claims."""
+"""Robots that no family knows: what a URDF can do is what the page of scenarios says."""
 
 from __future__ import annotations
 
@@ -26,15 +26,14 @@ from dikbench.scenario.family import certified_robots
 from dikbench.scenario.named_robots import NamedRobotFamily
 from scenarios import SCENARIOS
 
-README = Path(__file__).parents[2] / "README.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "scenarios.md"
 NAMED = [name for name, family in SCENARIOS.items() if issubclass(family, NamedRobotFamily)]
 
 
 @lru_cache
 def _table() -> dict[str, str]:
-    """Read the last column of the README's table of families, by family."""
-    _, _, section = README.read_text().partition("## The scenarios")
-    lines = section.partition("\n## ")[0].splitlines()
+    """Read the last column of the page's table of families, by family."""
+    lines = PAGE.read_text(encoding="utf-8").splitlines()
     return {
         match[1]: line.rstrip(" |").rpartition("|")[2].strip()
         for line in lines
@@ -75,7 +74,7 @@ def _margins(robot: Robot, q: Array) -> Array:
     return np.minimum(position.upper - q, q - position.lower)
 
 
-# --- the README's table
+# --- the page's table
 
 
 def test_the_table_has_every_family() -> None:

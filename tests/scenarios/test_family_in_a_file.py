@@ -1,4 +1,4 @@
-"""The family that the README shows: it runs as it stands there."""
+"""The family that its guide shows: it runs as it stands there."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from dikbench.study.plan import expand
 from dikbench.study.selection import Selection, select
 from dikbench.study.study import load_study
 
-README = Path(__file__).parents[2] / "README.md"
+GUIDE = Path(__file__).parents[2] / "docs" / "guides" / "add-a-family.md"
 
 
 @pytest.fixture
 def line(tmp_path: Path) -> str:
-    """The selector of the family, in a file as the README has it."""
-    blocks = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
+    """The selector of the family, in a file as the guide has it."""
+    blocks = re.findall(r"```python\n(.*?)```", GUIDE.read_text(encoding="utf-8"), re.DOTALL)
     (code,) = [block for block in blocks if "(Family)" in block]
     path = tmp_path / "my_line.py"
     path.write_text(code)

@@ -75,7 +75,7 @@ def test_a_documented_file_without_a_command_keeps_its_contract(name: str, tmp_p
 
 
 def test_every_kind_is_documented() -> None:
-    """The page has an example of each, but of families, which the README shows."""
+    """The page has an example of each, but of families, which a guide of its own shows."""
     assert {name.removesuffix(".py") for name in FILES} == {
         "my_law", "my_own_solver", "my_solver", "my_warm_solver", "my_plant", "my_robot",
         "my_metric",

@@ -110,11 +110,11 @@ def test_a_store_of_another_version_is_read_through_its_exports(
         dikbench.load_results(tmp_path)
 
 
-def test_the_readme_s_notebook(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_documented_notebook(monkeypatch: pytest.MonkeyPatch) -> None:
     """The example runs as it stands, and its last line is the peak speed per law and distance."""
     monkeypatch.chdir(Path(__file__).parents[3])
-    readme = Path("README.md").read_text(encoding="utf-8")
-    match = re.search(r"## In a notebook\n\n```python\n(.*?)```", readme, re.DOTALL)
+    page = Path("docs/guides/python.md").read_text(encoding="utf-8")
+    match = re.search(r"## In a notebook\n\n```python\n(.*?)```", page, re.DOTALL)
     assert match is not None
     *lines, last = match[1].splitlines()
     names: dict[str, object] = {}

@@ -63,7 +63,7 @@ def test_times_are_of_the_law_and_not_of_a_trial(results: Path) -> None:
 
 
 def test_tables_figures_and_manifest_are_written(results: Path) -> None:
-    """The files that the README promises are there and hold something."""
+    """The files that the guide to a first run promises are there and hold something."""
     for name in ("success", "tracking_error", "limit_violation", "timing", "solvers"):
         assert len(pd.read_csv(results / "tables" / f"{name}.csv")) > 3
         assert (results / "tables" / f"{name}.md").read_text().startswith("# ")

@@ -130,8 +130,8 @@ def test_better_is_the_registry_s_business(folder: Callable[..., Path]) -> None:
     np.testing.assert_allclose(formulations["mean_difference"], -0.1)
 
 
-def test_the_readme_s_tolerances() -> None:
-    """Those of its CI example are valid."""
-    readme = (Path(__file__).parents[4] / "README.md").read_text(encoding="utf-8")
-    found = re.findall(r"--tolerance (\S+=\S+)", readme)
+def test_the_documented_tolerances() -> None:
+    """Those of the CI example are valid."""
+    page = Path(__file__).parents[4] / "docs" / "guides" / "guard-a-ci.md"
+    found = re.findall(r"--tolerance (\S+=\S+)", page.read_text(encoding="utf-8"))
     assert [parse_tolerance(text).relative for text in found] == [False, True, False, True]

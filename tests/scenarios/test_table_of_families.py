@@ -1,4 +1,4 @@
-"""The README's table of families says which of them take a URDF."""
+"""The documented table of families says which of them take a URDF."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from dikbench.plugins.building import make_scenario
 from dikbench.plugins.finding import plugins
 from dikbench.robots.example_robot_data import data_file
 
-README = Path(__file__).parents[2] / "README.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "scenarios.md"
 ROBOTS = {
     name: robots
-    for name, robots in re.findall(r"^\| `([\w-]+)` \|.*\| ([^|]+) \|$", README.read_text(), re.M)
+    for name, robots in re.findall(r"^\| `([\w-]+)` \|.*\| ([^|]+) \|$", PAGE.read_text(), re.M)
     if name in plugins("scenario")
 }
 """What the last column says, by family."""
