@@ -14,6 +14,7 @@ from pebble import ProcessExpired
 from dikbench.results.folder import ResultsFolder
 from dikbench.run.blocks import Engine, EngineChoice, block_timeout, blocks_of, smaller
 from dikbench.run.pool import end_group, workers
+from dikbench.run.shards import WHOLE, Shard
 from dikbench.run.trial_row import CannotStore, TracePolicy, TrialRow, row_without_run, work
 from dikbench.run.trials_together import work_together
 from dikbench.selector import Selector
@@ -41,6 +42,7 @@ class RunSettings:
         rerun: which finished trials are run again: "", "failed", "outdated" (made by other sources
             or versions), "all", or the selector (or the name) of a formulation, scenario or solver.
         metrics: metrics of other authors that are computed in addition.
+        shard: the part of the study that is run.
     """
 
     jobs: int
@@ -50,6 +52,7 @@ class RunSettings:
     rerun: str = ""
     engine: EngineChoice = "auto"
     metrics: tuple[str, ...] = ()
+    shard: Shard = WHOLE
 
 
 def run_trials(
