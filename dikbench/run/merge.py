@@ -197,8 +197,8 @@ def _check_same(one: Part, other: Part) -> None:
         every = {**one.metrics, **other.metrics}
         differing = [name for name in every if one.metrics.get(name) != other.metrics.get(name)]
         raise DikbenchError(
-            f"{where}: they differ in the metrics {', '.join(differing)}; valid: the same in each, which "
-            "`dikbench recompute --metric` computes"
+            f"{where}: they differ in the metrics {', '.join(differing)}; valid: the same in each, "
+            "which `dikbench recompute --metric` computes"
         )
 
 
