@@ -124,6 +124,19 @@ def _selected(study: str | None, axes: dict[str, Any], out: Path | None) -> tupl
     "lockstep where there are many of a kind. The results are the same but for rounding.",
 )
 @click.option(
+    "--executor",
+    type=click.Choice(["local", "dask"]),
+    default="local",
+    show_default=True,
+    help="Where trials run: in processes of this machine, or on a cluster of dask.",
+)
+@click.option(
+    "--scheduler",
+    default="",
+    metavar="ADDRESS",
+    help="The scheduler of the cluster, such as tcp://host:8786, or its file (.json).",
+)
+@click.option(
     "--shard",
     default="1/1",
     metavar="NUMBER/PARTS",
@@ -139,6 +152,8 @@ def run(
     trial_memory: int,
     traces: Any,
     engine: Any,
+    executor: str,
+    scheduler: str,
     shard: str,
     **axes: Any,
 ) -> None:
@@ -153,11 +168,12 @@ def run(
     """
     from dikbench.report.write import write_report
     from dikbench.run.in_workers import RunSettings
+    from dikbench.run.on_dask import scheduler_given
     from dikbench.run.pool import available_cores
     from dikbench.run.runner import Interrupted, never_moved, run_study
     from dikbench.run.shards import WHOLE, parse_shard
 
-    part = parse_shard(shard)
+    part, scheduler = parse_shard(shard), scheduler_given(executor, scheduler)
     selected, folder = _selected(study, axes, out)
     command = shlex.join(["dikbench", *sys.argv[1:]])
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a stop like Ctrl-C
@@ -169,6 +185,7 @@ def run(
         rerun,
         engine,
         shard=part,
+        scheduler=scheduler,
     )
     try:
         run_study(selected, folder, settings, command)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from numbers import Integral
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 from msgspec.structs import asdict
 
@@ -16,6 +16,7 @@ from dikbench.results.reading import Results, load_results
 from dikbench.run import runner
 from dikbench.run.blocks import EngineChoice
 from dikbench.run.in_workers import RunSettings
+from dikbench.run.on_dask import scheduler_given
 from dikbench.run.pool import available_cores
 from dikbench.run.shards import WHOLE, parse_shard
 from dikbench.run.trial_row import TracePolicy
@@ -50,6 +51,8 @@ def run_study(
     traces: TracePolicy = "all",
     rerun: str = "",
     engine: EngineChoice = "auto",
+    executor: Literal["local", "dask"] = "local",
+    scheduler: str = "",
     shard: str = "1/1",
     report: bool = True,
 ) -> Results:
@@ -88,6 +91,8 @@ def run_study(
             versions), all, or the name or selector of a formulation, scenario or solver.
         engine: `lockstep`: trials of one kind run many at a time; `alone`: each by itself; `auto`:
             in lockstep where there are many of a kind. The results are the same but for rounding.
+        executor: `dask`: trials run on the workers of a cluster; `local`: on this machine.
+        scheduler: address of the scheduler of the cluster, or its file.
         shard: one of so many equal parts of the study, such as `2/4`, which `dikbench merge` puts
             together; the results are then what the folder has of the study.
         report: whether tables, figures and the report are written; never of a shard.
@@ -104,7 +109,8 @@ def run_study(
     Range(above=0.0, high=1.0).check("fraction", fraction)
     _check_choice("traces", traces, get_args(TracePolicy))
     _check_choice("engine", engine, get_args(EngineChoice))
-    part = parse_shard(shard)
+    _check_choice("executor", executor, ("local", "dask"))
+    part, scheduler = parse_shard(shard), scheduler_given(executor, scheduler)
     selection = Selection(
         formulations=_texts("formulations", formulations),
         scenarios=_texts("scenarios", scenarios),
@@ -127,6 +133,7 @@ def run_study(
         rerun,
         engine,
         shard=part,
+        scheduler=scheduler,
     )
     folder = results_folder(chosen, out)
     given = {
