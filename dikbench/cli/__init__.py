@@ -167,8 +167,8 @@ def run(
     has no report, and takes no times.
     """
     from dikbench.report.write import write_report
+    from dikbench.run.dask_client import scheduler_given
     from dikbench.run.in_workers import RunSettings
-    from dikbench.run.on_dask import scheduler_given
     from dikbench.run.pool import available_cores
     from dikbench.run.runner import Interrupted, never_moved, run_study
     from dikbench.run.shards import WHOLE, parse_shard

@@ -15,8 +15,8 @@ from dikbench.report.write import write_report
 from dikbench.results.reading import Results, load_results
 from dikbench.run import runner
 from dikbench.run.blocks import EngineChoice
+from dikbench.run.dask_client import scheduler_given
 from dikbench.run.in_workers import RunSettings
-from dikbench.run.on_dask import scheduler_given
 from dikbench.run.pool import available_cores
 from dikbench.run.shards import WHOLE, parse_shard
 from dikbench.run.trial_row import TracePolicy

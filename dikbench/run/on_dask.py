@@ -6,7 +6,6 @@ again, alone on a worker: a trial that loses that one too is `crashed`.
 
 from __future__ import annotations
 
-import logging
 import queue
 import sys
 import time
@@ -21,6 +20,7 @@ from dikbench.errors import DikbenchError
 from dikbench.metrics import described, other_metrics
 from dikbench.results.folder import ResultsFolder
 from dikbench.run.block_work import Block, BlockSettings, Finished
+from dikbench.run.dask_client import SECONDS_OF_CONNECTION, connected
 from dikbench.run.provenance import environment
 from dikbench.run.same_as_driver import Expected
 from dikbench.run.trial_row import CannotStore, row_without_run
@@ -33,27 +33,8 @@ AHEAD: Final = 2
 SECONDS_BETWEEN_LOOKS: Final = 0.5
 """How often it is asked which workers there are."""
 
-SECONDS_OF_CONNECTION: Final = 20.0
-"""Wall-clock limit of what is asked of the scheduler."""
-
 MOST_LOSSES: Final = 2
 """A trial that loses so many workers, the last one while it was alone on it, is not run again."""
-
-
-def scheduler_given(executor: str, scheduler: str) -> str:
-    """Return the scheduler on whose cluster trials run; empty for this machine.
-
-    Raises:
-        DikbenchError: if executor and scheduler do not belong together.
-    """
-    if executor == "dask" and not scheduler:
-        raise DikbenchError(
-            "executor dask needs a scheduler; valid: its address, such as tcp://host:8786, or its "
-            "file"
-        )
-    if executor != "dask" and scheduler:
-        raise DikbenchError(f"scheduler {scheduler} is for executor dask; valid: with it")
-    return scheduler
 
 
 @dataclass(eq=False)
@@ -195,7 +176,8 @@ class OnDask:
             if losses < MOST_LOSSES or not seat.reserved:
                 self._losses |= dict.fromkeys((p.id for p in block), losses)
                 self._suspects.append(block)
-            elif len(block) > 1:  # who it was is found out in smaller blocks
+            elif len(block) > 1:  # who it was is found out in smaller blocks, from the beginning
+                self._losses |= dict.fromkeys((p.id for p in block), 0)
                 self._made.append((block, None))
             else:
                 reason = f"the trial ended {losses} workers of the cluster"
@@ -294,46 +276,20 @@ def on_dask(address: str, folder: ResultsFolder, how: BlockSettings) -> Iterator
     """Connect to a cluster; what runs there for us ends with this.
 
     Args:
-        address: of its scheduler, such as `tcp://host:8786`, or the scheduler's file (.json).
+        address: see `connected`.
         folder: where traces are kept.
         how: how blocks are run.
 
     Raises:
         DikbenchError: if dask.distributed is not installed, or there is no scheduler.
     """
-    try:
-        from distributed import Client
-    except ImportError:
-        raise DikbenchError(
-            "dask.distributed is not installed; valid: pip install 'dikbench[dask]'"
-        ) from None
-    from dikbench.run.dask_worker import release
+    with connected(address) as client:
+        from dikbench.run.dask_worker import release
 
-    logger = logging.getLogger("distributed")
-    level = logger.level
-    logger.setLevel(logging.CRITICAL + 1)  # what is lost is told in one line
-    where: dict[str, Any] = (
-        {"scheduler_file": address} if address.endswith(".json") else {"address": address}
-    )
-    try:
+        executor = OnDask(client, address, folder, how)
         try:
-            client = Client(**where, timeout=SECONDS_OF_CONNECTION, set_as_default=False)
-        except (OSError, TimeoutError, ValueError) as error:
-            reason = " ".join(str(error).split()) or type(error).__name__
-            raise DikbenchError(
-                f"scheduler {address} cannot be reached: {reason}; valid: the address of a "
-                "scheduler, such as tcp://host:8786, or its file"
-            ) from None
-        try:
-            executor = OnDask(client, address, folder, how)
-            try:
-                yield executor
-            finally:
-                if client.status == "running":
-                    with suppress(Exception):  # of workers that are lost meanwhile
-                        client.run(release, executor.run, on_error="ignore")
+            yield executor
         finally:
-            with suppress(Exception):
-                client.close(timeout=SECONDS_OF_CONNECTION)
-    finally:
-        logger.setLevel(level)
+            if client.status == "running":
+                with suppress(Exception):  # of workers that are lost meanwhile
+                    client.run(release, executor.run, on_error="ignore")
