@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -13,6 +14,9 @@ from dikbench.errors import DikbenchError
 
 SECONDS_OF_CONNECTION: Final = 20.0
 """Wall-clock limit of what is asked of the scheduler."""
+
+SECONDS_BETWEEN_LOOKS: Final = 0.2
+"""How often it is looked whether a scheduler has written its file."""
 
 
 def scheduler_given(executor: str, scheduler: str) -> str:
@@ -68,7 +72,13 @@ def connected(address: str) -> Iterator[Any]:
 
 
 def _address_in(file: str) -> str:
-    """Read the address in a scheduler's file; dask would wait for a file for ever."""
+    """Read the address in a scheduler's file, which is written when the scheduler has started.
+
+    dask would wait for it for ever.
+    """
+    deadline = time.monotonic() + SECONDS_OF_CONNECTION
+    while not Path(file).is_file() and time.monotonic() < deadline:
+        time.sleep(SECONDS_BETWEEN_LOOKS)
     return str(json.loads(Path(file).read_bytes())["address"])
 
 
