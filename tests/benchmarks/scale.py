@@ -26,18 +26,20 @@ from time import process_time
 from dikbench.results.folder import ResultsFolder
 from dikbench.results.store import Store
 from dikbench.run.blocks import blocks_of
+from dikbench.run.in_workers import RunSettings
 from dikbench.run.provenance import environment, manifest
+from dikbench.run.runner import run_study
 from dikbench.run.trial_row import TrialRow, work
 from dikbench.run.trials_together import work_together
 from dikbench.study.plan import PlannedTrial, expand
 from dikbench.study.study import Cells, Study
 
 SAMPLE = Study(
-    description="drawn instances of three families, laws with and without a solver",
+    description="drawn instances of two families and robots, laws with and without a solver",
     cells=(Cells(("dls", "dls-manipulability", "qp", "lp-alpha")),),
-    scenarios=("reach", "near-miss", "speed-sweep"),
+    scenarios=("reach[robot=panda]", "near-miss[robot=ur5]"),
     plants=("ideal",),
-    instances=48,
+    instances=96,
     name="sample",
 )
 
@@ -47,8 +49,11 @@ WRITTEN = 20_000
 """So many rows are written to measure what the writer does."""
 
 IN_A_BLOCK = 1024
-ALONE = 24
+ALONE = 96
 """So many trials are run alone, spread over the sample."""
+
+SHORT = 1000
+"""So many short trials are run to measure what the driver does for each."""
 
 
 @dataclass
@@ -59,6 +64,8 @@ class Costs:
     lockstep_s: float = 0.0
     written_singly_s: float = 0.0
     written_in_blocks_s: float = 0.0
+    handled_here_s: float = 0.0
+    handled_on_dask_s: float = 0.0
     planned_s: float = 0.0
     exported_s: float = 0.0
     stored_bytes: float = 0.0
@@ -75,6 +82,7 @@ def measured() -> Costs:
     with tempfile.TemporaryDirectory() as folder:
         row = _run(planned, ResultsFolder(Path(folder)), costs)
         _write(planned[0], row, Path(folder), costs)
+    _handle(costs)
     _plan(costs)
     return costs
 
@@ -125,10 +133,33 @@ def _write(p: PlannedTrial, row: TrialRow, folder: Path, costs: Costs) -> None:
         costs.exported_bytes = exported / WRITTEN
 
 
+def _short(number: int) -> Study:
+    """Make a study of so many short trials."""
+    laws = tuple(f"dls[damping={1e-6 * (each + 1):.6f}]" for each in range(number))
+    scenario = "reach[duration=0.1]"
+    return Study("short trials", (Cells(laws),), (scenario,), plants=("ideal",), name="short")
+
+
+def _handle(costs: Costs) -> None:
+    """Run short trials, each alone; what is told is of the driver, not of the workers.
+
+    The scheduler of the cluster is in the driver's process, so that its work is in the figure too.
+    """
+    from distributed import LocalCluster
+
+    study = _short(SHORT)
+    how = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
+    with tempfile.TemporaryDirectory() as folder, LocalCluster(**how) as cluster:
+        for name, scheduler in (("here", ""), ("on_dask", cluster.scheduler_address)):
+            settings = RunSettings(2, traces="none", engine="alone", scheduler=scheduler)
+            with _timed(SHORT) as took:
+                run_study(study, Path(folder) / name, settings, "scale")
+            setattr(costs, f"handled_{name}_s", took[0])
+
+
 def _plan(costs: Costs) -> None:
     """Make a plan of many trials."""
-    laws = tuple(f"dls[damping={1e-6 * (number + 1):.6f}]" for number in range(WRITTEN))
-    study = Study("many trials", (Cells(laws),), ("reach",), plants=("ideal",), name="many")
+    study = _short(WRITTEN)
     before = _memory()
     with _timed(WRITTEN) as took:
         planned = expand(study)
@@ -165,6 +196,8 @@ def table(costs: Costs) -> str:
         "rows on the network": [_bytes(costs.row_bytes * n) for n in SIZES],
         "writer, row by row": [_time(costs.written_singly_s * n) for n in SIZES],
         "writer, in blocks": [_time(costs.written_in_blocks_s * n) for n in SIZES],
+        "driver, each trial alone": [_time(costs.handled_here_s * n) for n in SIZES],
+        "driver and scheduler of dask": [_time(costs.handled_on_dask_s * n) for n in SIZES],
         "plan": [_time(costs.planned_s * n) for n in SIZES],
         "plan in the driver's memory": [_bytes(costs.planned_bytes * n) for n in SIZES],
         "export": [_time(costs.exported_s * n) for n in SIZES],
@@ -200,11 +233,13 @@ def main() -> None:
         unit = "ms" if name.endswith("_s") else "bytes"
         print(f"{name.rpartition('_')[0]:20} {value * (1e3 if unit == 'ms' else 1):10.3f} {unit}")
     print(f"\n{table(costs)}\n")
-    for how, trial, writer in (
-        ("alone", costs.alone_s, costs.written_singly_s),
-        ("lockstep", costs.lockstep_s, costs.written_in_blocks_s),
+    for how, trial, driver in (
+        ("alone, on this machine", costs.alone_s, costs.handled_here_s),
+        ("alone, on dask", costs.alone_s, costs.handled_on_dask_s),
+        ("alone, the writer itself", costs.alone_s, costs.written_singly_s),
+        ("lockstep, the writer itself", costs.lockstep_s, costs.written_in_blocks_s),
     ):
-        print(f"{how}: one writer keeps up with {trial / writer:,.0f} cores")
+        print(f"{how}: it keeps up with {trial / driver:,.0f} cores")
     sys.stdout.flush()
 
 
