@@ -11,7 +11,7 @@ import sys
 import time
 import uuid
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -28,7 +28,10 @@ from dikbench.simulation.status import Status
 from dikbench.study.identity import sources_of
 
 AHEAD: Final = 2
-"""So many blocks for each thread of a worker: one that runs, one that waits."""
+"""So many bundles of blocks for each thread of a worker: one that runs, one that waits."""
+
+MOST_ALONE: Final = 16
+"""So many trials that run alone are in a bundle: each bundle costs the driver milliseconds."""
 
 SECONDS_BETWEEN_LOOKS: Final = 0.5
 """How often it is asked which workers there are."""
@@ -43,14 +46,14 @@ class Seat:
 
     Attributes:
         address: where it is.
-        threads: number of blocks that it runs at a time.
-        blocks: those that were given to it, by their futures' keys, in their order.
+        threads: number of bundles of blocks that it runs at a time.
+        bundles: those that were given to it, by their futures' keys, in their order.
         reserved: whether it runs one block alone, or waits for it.
     """
 
     address: str
     threads: int
-    blocks: dict[str, tuple[Any, Block]] = field(default_factory=dict)
+    bundles: dict[str, tuple[Any, list[Block]]] = field(default_factory=dict)
     reserved: bool = False
 
 
@@ -67,16 +70,17 @@ class OnDask:
     def __init__(
         self, client: Any, address: str, folder: ResultsFolder, how: BlockSettings
     ) -> None:
-        from dikbench.run.dask_worker import run_block
+        from dikbench.run.dask_worker import run_blocks
 
         self.run = uuid.uuid4().hex
-        self._run_block = run_block
+        self._run_blocks = run_blocks
         self._client = client
         self._address = address
         self._folder = folder
         self._how = how
-        self._environment = environment(how.commit, how.command)
-        self._metrics = described(other_metrics(how.metrics))
+        own = environment(how.commit, how.command)
+        self._expected = Expected(own, {}, described(other_metrics(how.metrics)))
+        self._most = MOST_ALONE if how.engine == "alone" else 1
         self._seats: dict[str, Seat] = {}
         self._refused: dict[str, str] = {}
         self._waiting: deque[Block] = deque()
@@ -90,8 +94,11 @@ class OnDask:
 
     def has_room(self) -> bool:
         """Say whether another block should be given."""
-        free = sum(AHEAD * seat.threads - len(seat.blocks) for seat in self._seats.values())
-        return len(self._waiting) + len(self._suspects) < max(1, free)
+        return len(self._waiting) + len(self._suspects) < self._most * max(1, self._free())
+
+    def _free(self) -> int:
+        """Count the bundles that workers could be given."""
+        return sum(AHEAD * seat.threads - len(seat.bundles) for seat in self._seats.values())
 
     def give(self, block: Block) -> None:
         """Have a block run."""
@@ -100,7 +107,7 @@ class OnDask:
 
     def is_busy(self) -> bool:
         """Say whether blocks were given that are not finished."""
-        running = any(seat.blocks for seat in self._seats.values())
+        running = any(seat.bundles for seat in self._seats.values())
         return bool(running or self._waiting or self._suspects or self._made)
 
     def finished(self) -> list[Finished]:
@@ -160,72 +167,78 @@ class OnDask:
 
     def _lose(self, seat: Seat) -> None:
         """Give what was on a lost worker to others; what ran is suspected of having ended it."""
-        blocks = [*seat.blocks.values()]
+        bundles = [*seat.bundles.values()]
+        number = sum(len(block) for _, blocks in bundles for block in blocks)
         print(
-            f"worker {seat.address} is lost; {len(blocks)} "
-            f"{'block' if len(blocks) == 1 else 'blocks'} of trials run elsewhere",
+            f"worker {seat.address} is lost; {number} {'trial' if number == 1 else 'trials'} "
+            "that it was given run elsewhere",
             file=sys.stderr,
             flush=True,
         )
-        for place, (future, block) in enumerate(blocks):
+        for place, (future, blocks) in enumerate(bundles):
             future.cancel()
-            if place >= seat.threads:  # it had not begun
-                self._waiting.appendleft(block)
-                continue
-            losses = 1 + max(self._losses.get(p.id, 0) for p in block)
-            if losses < MOST_LOSSES or not seat.reserved:
-                self._losses |= dict.fromkeys((p.id for p in block), losses)
-                self._suspects.append(block)
-            elif len(block) > 1:  # who it was is found out in smaller blocks, from the beginning
-                self._losses |= dict.fromkeys((p.id for p in block), 0)
-                self._made.append((block, None))
-            else:
-                reason = f"the trial ended {losses} workers of the cluster"
-                row = row_without_run(block[0].trial, Status.CRASHED, reason)
-                self._made.append((block, [row]))
+            if place < seat.threads:
+                for block in blocks:
+                    self._suspect(block, alone=seat.reserved)
+            else:  # it had not begun
+                self._waiting.extendleft(blocks)
+
+    def _suspect(self, block: Block, *, alone: bool) -> None:
+        """Have a block that was on a lost worker run alone, or end what was it again."""
+        losses = 1 + max(self._losses.get(p.id, 0) for p in block)
+        if losses < MOST_LOSSES or not alone:
+            self._losses |= dict.fromkeys((p.id for p in block), losses)
+            self._suspects.append(block)
+        elif len(block) > 1:  # who it was is found out in smaller blocks, from the beginning
+            self._losses |= dict.fromkeys((p.id for p in block), 0)
+            self._made.append((block, None))
+        else:
+            reason = f"the trial ended {losses} workers of the cluster"
+            row = row_without_run(block[0].trial, Status.CRASHED, reason)
+            self._made.append((block, [row]))
 
     def _place(self) -> None:
         """Pin blocks to workers: suspects alone, the others where least is waiting."""
-        seats = sorted(self._seats.values(), key=lambda seat: len(seat.blocks) / seat.threads)
+        seats = sorted(self._seats.values(), key=lambda seat: len(seat.bundles) / seat.threads)
         for seat in seats:
-            if seat.reserved and not seat.blocks:
+            if seat.reserved and not seat.bundles:
                 seat.reserved = False
         for seat in seats:
             if sum(each.reserved for each in seats) < len(self._suspects):
                 seat.reserved = True
-            if seat.reserved and not seat.blocks and self._suspects:
-                self._pin(self._suspects.popleft(), seat)
+            if seat.reserved and not seat.bundles and self._suspects:
+                self._pin([self._suspects.popleft()], seat)
         open_seats = [seat for seat in seats if not seat.reserved]
         while self._waiting and open_seats:
-            seat = min(open_seats, key=lambda seat: len(seat.blocks) / seat.threads)
-            if len(seat.blocks) >= AHEAD * seat.threads:
+            seat = min(open_seats, key=lambda seat: len(seat.bundles) / seat.threads)
+            if len(seat.bundles) >= AHEAD * seat.threads:
                 break
-            self._pin(self._waiting.popleft(), seat)
+            size = min(self._most, max(1, len(self._waiting) // max(1, self._free())))
+            self._pin([self._waiting.popleft() for _ in range(size)], seat)
 
-    def _pin(self, block: Block, seat: Seat) -> None:
+    def _pin(self, blocks: list[Block], seat: Seat) -> None:
         self._given += 1
         key = f"dikbench-{self.run}-{self._given}"
-        sources = sources_of(p.trial for p in block)
-        expected = Expected(self._environment, sources, self._metrics)
         future = self._client.submit(
-            self._run_block,
+            self._run_blocks,
             self.run,
-            block,
+            blocks,
             self._how,
-            expected,
+            self._expected,
+            [sources_of(p.trial for p in block) for block in blocks],
             key=key,
             workers=[seat.address],
             priority=-self._given,  # a worker runs them in their order
             pure=False,
         )
-        seat.blocks[key] = future, block
+        seat.bundles[key] = future, blocks
         future.add_done_callback(lambda _: self._ended.put((seat, key)))
 
     def _take(self, seat: Seat, key: str) -> None:
-        """Take what came of a block, unless its worker was lost."""
-        if key not in seat.blocks or seat.address not in self._seats:
+        """Take what came of blocks, unless their worker was lost."""
+        if key not in seat.bundles or seat.address not in self._seats:
             return
-        future, block = seat.blocks[key]
+        future, blocks = seat.bundles[key]
         if future.status not in ("finished", "error"):  # its worker or the scheduler is lost
             return
         try:
@@ -235,28 +248,33 @@ class OnDask:
         except (TimeoutError, OSError):  # it was lost with its answer
             return
         except Exception as error:  # such as a dikbench without this module
-            del seat.blocks[key]
-            self._refuse(seat, block, f"{type(error).__name__}: {error}".partition("\n")[0])
+            del seat.bundles[key]
+            self._refuse(seat, blocks, f"{type(error).__name__}: {error}".partition("\n")[0])
             return
-        del seat.blocks[key]
+        del seat.bundles[key]
         if answer.refused:
-            self._refuse(seat, block, answer.refused)
+            self._refuse(seat, blocks, answer.refused)
             return
-        for name, trace in answer.traces.items():
-            self._keep(name, trace)
-        for p in block if answer.rows is not None else ():
-            self._losses.pop(p.id, None)
-        self._made.append((block, answer.rows))
+        for block, made in zip(blocks, answer.made, strict=True):
+            if made is None:  # there was no time for it
+                self._waiting.appendleft(block)
+                continue
+            rows, traces = made
+            for name, trace in traces.items():
+                self._keep(name, trace)
+            for p in block if rows is not None else ():
+                self._losses.pop(p.id, None)
+            self._made.append((block, rows))
 
-    def _refuse(self, seat: Seat, block: Block, reason: str) -> None:
-        """Use a worker no more; blocks that it has come back one by one."""
-        self.give(block)
+    def _refuse(self, seat: Seat, blocks: Iterable[Block], reason: str) -> None:
+        """Use a worker no more; what it was given goes to others."""
         if seat.address not in self._refused:
             self._refused[seat.address] = reason
             print(f"worker {seat.address} is refused: {reason}", file=sys.stderr, flush=True)
-        for future, other in seat.blocks.values():
+        for future, _ in seat.bundles.values():
             future.cancel()
-            self.give(other)
+        for block in [*blocks, *(block for _, others in seat.bundles.values() for block in others)]:
+            self.give(block)
         self._seats.pop(seat.address, None)
 
     def _keep(self, trial: str, trace: bytes) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from dikbench.results.folder import ResultsFolder
 from dikbench.run import dask_client
 from dikbench.run import on_dask as module
 from dikbench.run.block_work import Block, BlockSettings
+from dikbench.run.blocks import Engine
 from dikbench.run.in_workers import _run_blocks
 from dikbench.run.on_dask import OnDask
 from dikbench.run.same_as_driver import Expected, OtherWorker, as_expected
@@ -25,7 +27,7 @@ from dikbench.study.plan import PlannedTrial
 from dikbench.study.trial import Trial
 
 pytest.importorskip("distributed")
-from dikbench.run.dask_worker import Answer
+from dikbench.run.dask_worker import Answer, Made
 
 HOW = BlockSettings("lockstep", 1.0, 1, "all", None, "", ())
 
@@ -70,7 +72,7 @@ class _Cluster:
         self.draw = draw
         self.killers = killers
         self.losses = losses
-        self.workers: dict[str, list[tuple[_Future, Block]]] = {}
+        self.workers: dict[str, list[tuple[_Future, list[Block]]]] = {}
         self.threads: dict[str, int] = {}
         self.started = 0
         self.ended_by: Counter[str] = Counter()
@@ -87,10 +89,16 @@ class _Cluster:
         return dict(self.threads)
 
     def submit(
-        self, function: object, run: str, block: Block, *rest: Any, workers: list[str], **how: Any
+        self,
+        function: object,
+        run: str,
+        blocks: list[Block],
+        *rest: Any,
+        workers: list[str],
+        **how: Any,
     ) -> _Future:
         future = _Future()
-        self.workers.get(workers[0], []).append((future, block))  # or to one that is lost
+        self.workers.get(workers[0], []).append((future, blocks))  # or to one that is lost
         return future
 
     def step(self) -> None:
@@ -100,17 +108,20 @@ class _Cluster:
             return
         name = busy[self.draw(len(busy))]
         tasks = self.workers[name]
-        future, block = tasks[self.draw(min(len(tasks), self.threads[name]))]
-        killer = [p.id for p in block if p.id in self.killers]
+        future, blocks = tasks[self.draw(min(len(tasks), self.threads[name]))]
+        done = 1 + self.draw(len(blocks))  # there is no time for the others
+        killer = [p.id for block in blocks[:done] for p in block if p.id in self.killers]
         if killer or (self.losses and self.draw(3) == 0):
             self.losses -= not killer
             self.ended_by.update(killer)
             self.start(self.threads[name])
             del self.workers[name], self.threads[name]
             return
-        tasks.remove((future, block))
-        rows: list[TrialRow] = [{"status": "ok", "id": p.id} for p in block]
-        future.end("finished", Answer(rows, {}))
+        tasks.remove((future, blocks))
+        made: list[Made | None] = [None] * len(blocks)
+        for place, block in enumerate(blocks[:done]):
+            made[place] = [{"status": "ok", "id": p.id} for p in block], {}
+        future.end("finished", Answer(made))
 
 
 def _block(number: int, size: int) -> Block:
@@ -121,8 +132,8 @@ def _block(number: int, size: int) -> Block:
     return [PlannedTrial(f"{number}-{k}", trial) for k, trial in enumerate(trials)]
 
 
-def _executor(client: Any, folder: Path) -> OnDask:
-    return OnDask(client, "tcp://played", ResultsFolder(folder), HOW)
+def _executor(client: Any, folder: Path, engine: Engine = "lockstep") -> OnDask:
+    return OnDask(client, "tcp://played", ResultsFolder(folder), replace(HOW, engine=engine))
 
 
 @pytest.fixture(autouse=True)
@@ -133,7 +144,10 @@ def _at_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @settings(max_examples=60)
 @given(
-    sizes=st.lists(st.integers(1, 4), min_size=1, max_size=12),
+    sizes=st.one_of(
+        st.lists(st.integers(1, 4), min_size=1, max_size=12),  # in lockstep
+        st.lists(st.just(1), min_size=1, max_size=60),
+    ),
     threads=st.lists(st.integers(1, 3), min_size=1, max_size=3),
     losses=st.integers(0, 1),
     killers=st.sets(st.integers(0, 30), max_size=3),
@@ -149,7 +163,7 @@ def test_every_trial_has_one_row_whatever_becomes_of_the_workers(
     client = _Cluster(random.randrange, guilty, losses)
     for number in threads:
         client.start(number)
-    executor = _executor(client, Path("nowhere"))
+    executor = _executor(client, Path("nowhere"), "alone" if set(sizes) == {1} else "lockstep")
     found = [
         (p.id, row["status"]) for some in _run_blocks(deque(blocks), executor) for p, row in some
     ]
@@ -177,15 +191,16 @@ class _Answering(_Cluster):
     def step(self) -> None:
         for name, tasks in self.workers.items():
             while tasks:
-                future, block = tasks.pop()
-                answer = self.answers[name]
-                rows = [{"status": "ok"} for _ in block]
-                answer = Answer(rows, {p.id: b"x" for p in block}) if answer is None else answer
+                future, blocks = tasks.pop()
+                rows: list[list[TrialRow]] = [[{"status": "ok"} for _ in each] for each in blocks]
+                traces = [{p.id: b"x" for p in each} for each in blocks]
+                done = Answer([*zip(rows, traces, strict=True)])
+                answer = done if self.answers[name] is None else self.answers[name]
                 future.end("error" if isinstance(answer, Exception) else "finished", answer)
 
 
 @pytest.mark.parametrize(
-    "answer", [Answer(None, {}, "numpy 1 and 2"), ModuleNotFoundError("no numpy 1 and 2")]
+    "answer", [Answer([None], "numpy 1 and 2"), ModuleNotFoundError("no numpy 1 and 2")]
 )
 def test_a_worker_that_is_refused_gets_nothing_more(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], answer: Any
