@@ -136,6 +136,7 @@ def _described_solver(solver: Solver) -> list[Any]:
     return [solver.name, solver.interface, settings, solver.tolerance, *source, *then]
 
 
+@lru_cache(maxsize=4096)
 def _plant(selector: Selector) -> tuple[Any, ...]:
     plant = (selector.name, *astuple(make_plant(selector)))
     if selector.name not in PLANTS:
