@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from dikbench.errors import DikbenchError, unknown
 from dikbench.metrics import take_errors
@@ -39,6 +39,9 @@ from dikbench.study.trial import Trial
 
 TIMING_TIMEOUT_S: Final = 900.0
 """Wall-clock limit of the timing of one scenario."""
+
+OF_THE_TRIALS: Final = ("engine", "sources", SHARD, TRIALS_OF_SHARD)
+"""Entries of the description of a run that stay when times alone are taken."""
 
 MISSING: Final = "missing"
 """What the status of a trial without a row is called."""
@@ -146,7 +149,8 @@ def time_study(study: Study, out: Path, command: str) -> ResultsFolder:
     folder = ResultsFolder(out)
     with store_for(folder, study) as store:
         described = environment(git_commit(), command)
-        run = store.begin_run(manifest(study, len(planned), described), planned)
+        kept = {key: value for key, value in _last_run(store).items() if key in OF_THE_TRIALS}
+        run = store.begin_run({**manifest(study, len(planned), described), **kept}, planned)
         try:
             _time(folder, store, run, study, planned, set(), described)
         except KeyboardInterrupt:
@@ -154,6 +158,14 @@ def time_study(study: Study, out: Path, command: str) -> ResultsFolder:
         folder.export(store)
         store.close_neatly()
     return folder
+
+
+def _last_run(store: Store) -> Mapping[str, Any]:
+    """Return the description of the last run; empty where there was none."""
+    try:
+        return store.runs()[-1]
+    except DikbenchError:
+        return {}
 
 
 def _check_rerun(rerun: str, planned: Sequence[PlannedTrial]) -> None:
