@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import argparse
 import resource
+import sqlite3
 import tempfile
 import time
+from contextlib import closing
 from pathlib import Path
 
-from dikbench.results.reading import load_results
 from dikbench.run.in_workers import RunSettings
 from dikbench.run.runner import run_study
 from dikbench.study.plan import expand
@@ -61,12 +62,14 @@ def main() -> None:
             out = Path(folder) / "out"
             run_study(study_of(count), out, settings, "overhead")
             wall = time.perf_counter() - begun
-            busy = float(load_results(out).trials["wall_time_s"].sum())
+            memory = _largest_memory() - start
+            with closing(sqlite3.connect(out / "results.sqlite")) as database:
+                [busy] = database.execute("SELECT SUM(wall_time_s) FROM trials").fetchone()
         print(
             f"{len(planned)} trials: expanded in {expanding:.2f} s, run in {wall:.1f} s, of it "
             f"{1e3 * busy / count:.2f} ms per trial in the trial; overhead "
             f"{1e3 * (2 * wall - busy) / count:.2f} ms of worker time per trial; the driver's "
-            f"largest memory {_largest_memory() - start:.0f} MB above its start",
+            f"largest memory {memory:.0f} MB above its start",
             flush=True,
         )
 
