@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from dikbench.cli.checking import check
+from dikbench.cli.merging_command import merge
 from dikbench.cli.new_command import new
 from dikbench.cli.one_line_errors import one_line_errors
 from dikbench.cli.reading_commands import compare, replay, table
@@ -122,6 +123,25 @@ def _selected(study: str | None, axes: dict[str, Any], out: Path | None) -> tupl
     help="Whether trials of one kind run in lockstep, many at a time, or each alone; auto: in "
     "lockstep where there are many of a kind. The results are the same but for rounding.",
 )
+@click.option(
+    "--executor",
+    type=click.Choice(["local", "dask"]),
+    default="local",
+    show_default=True,
+    help="Where trials run: in processes of this machine, or on a cluster of dask.",
+)
+@click.option(
+    "--scheduler",
+    default="",
+    metavar="ADDRESS",
+    help="The scheduler of the cluster, such as tcp://host:8786, or its file (.json).",
+)
+@click.option(
+    "--shard",
+    default="1/1",
+    metavar="NUMBER/PARTS",
+    help="Run one of so many equal parts of the study, which `dikbench merge` puts together.",
+)
 @one_line_errors
 def run(
     study: str | None,
@@ -132,6 +152,9 @@ def run(
     trial_memory: int,
     traces: Any,
     engine: Any,
+    executor: str,
+    scheduler: str,
+    shard: str,
     **axes: Any,
 ) -> None:
     """Run what is missing of a study: the matrix of formulations x scenarios x solvers.
@@ -140,24 +163,38 @@ def run(
     option replaces an axis of the study. The same command continues a run that was stopped.
 
     The exit code is 0 also where trials failed, which the report counts; 3 where no trial of a
-    formulation took a step, 2 where nothing could be run, 130 where the run was stopped.
+    formulation took a step, 2 where nothing could be run, 130 where the run was stopped. A shard
+    has no report, and takes no times.
     """
     from dikbench.report.write import write_report
+    from dikbench.run.dask_client import scheduler_given
     from dikbench.run.in_workers import RunSettings
     from dikbench.run.pool import available_cores
     from dikbench.run.runner import Interrupted, never_moved, run_study
+    from dikbench.run.shards import WHOLE, parse_shard
 
+    part, scheduler = parse_shard(shard), scheduler_given(executor, scheduler)
     selected, folder = _selected(study, axes, out)
     command = shlex.join(["dikbench", *sys.argv[1:]])
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a stop like Ctrl-C
     settings = RunSettings(
-        jobs or available_cores(), trial_timeout, trial_memory, traces, rerun, engine
+        jobs or available_cores(),
+        trial_timeout,
+        trial_memory,
+        traces,
+        rerun,
+        engine,
+        shard=part,
+        scheduler=scheduler,
     )
     try:
         run_study(selected, folder, settings, command)
     except Interrupted as stopped:
         click.echo(f"\nstopped: {stopped}; to continue: {command}", err=True)
         sys.exit(130)
+    if part != WHOLE:
+        click.echo(f"shard {part} is done; {folder / 'trials.csv'}")
+        return
     click.echo(f"\n{write_report(folder)}\n\n{folder / 'report.html'}")
     standstill = never_moved(folder)
     for name, reason in standstill.items():
@@ -287,6 +324,7 @@ def show(name: str, figure: Path | None, instance: int | None) -> None:
 
 commands.add_command(check)
 commands.add_command(compare)
+commands.add_command(merge)
 commands.add_command(new)
 commands.add_command(replay)
 commands.add_command(reproduce)

@@ -83,8 +83,10 @@ def compare(
     from dikbench.report.comparison.comparison import compare as compare_folders
     from dikbench.report.comparison.rendering import render, write
     from dikbench.report.comparison.tolerances import parse_tolerance
+    from dikbench.results.reading import metrics_in
 
-    found = compare_folders(a, b, [parse_tolerance(text) for text in tolerances])
+    others = {**metrics_in(a), **metrics_in(b)}
+    found = compare_folders(a, b, [parse_tolerance(text, others) for text in tolerances])
     if out is not None:
         write(found, out)
     click.echo(render(found))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from numbers import Integral
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 from msgspec.structs import asdict
 
@@ -15,8 +15,10 @@ from dikbench.report.write import write_report
 from dikbench.results.reading import Results, load_results
 from dikbench.run import runner
 from dikbench.run.blocks import EngineChoice
+from dikbench.run.dask_client import scheduler_given
 from dikbench.run.in_workers import RunSettings
 from dikbench.run.pool import available_cores
+from dikbench.run.shards import WHOLE, parse_shard
 from dikbench.run.trial_row import TracePolicy
 from dikbench.scenario.plant import REFERENCE_MODES
 from dikbench.study.selection import Selection, select
@@ -49,6 +51,9 @@ def run_study(
     traces: TracePolicy = "all",
     rerun: str = "",
     engine: EngineChoice = "auto",
+    executor: Literal["local", "dask"] = "local",
+    scheduler: str = "",
+    shard: str = "1/1",
     report: bool = True,
 ) -> Results:
     """Run what is missing of a study, write its report and load its results.
@@ -86,7 +91,11 @@ def run_study(
             versions), all, or the name or selector of a formulation, scenario or solver.
         engine: `lockstep`: trials of one kind run many at a time; `alone`: each by itself; `auto`:
             in lockstep where there are many of a kind. The results are the same but for rounding.
-        report: whether tables, figures and the report are written.
+        executor: `dask`: trials run on the workers of a cluster; `local`: on this machine.
+        scheduler: address of the scheduler of the cluster, or its file.
+        shard: one of so many equal parts of the study, such as `2/4`, which `dikbench merge` puts
+            together; the results are then what the folder has of the study.
+        report: whether tables, figures and the report are written; never of a shard.
 
     Raises:
         DikbenchError: if the study, a selector or the folder is not valid.
@@ -100,6 +109,8 @@ def run_study(
     Range(above=0.0, high=1.0).check("fraction", fraction)
     _check_choice("traces", traces, get_args(TracePolicy))
     _check_choice("engine", engine, get_args(EngineChoice))
+    _check_choice("executor", executor, ("local", "dask"))
+    part, scheduler = parse_shard(shard), scheduler_given(executor, scheduler)
     selection = Selection(
         formulations=_texts("formulations", formulations),
         scenarios=_texts("scenarios", scenarios),
@@ -115,14 +126,21 @@ def run_study(
         _check_choice("references", reference, REFERENCE_MODES)
     chosen = selected(None if study is None else str(study), selection)
     settings = RunSettings(
-        jobs or available_cores(), trial_timeout, trial_memory, traces, rerun, engine
+        jobs or available_cores(),
+        trial_timeout,
+        trial_memory,
+        traces,
+        rerun,
+        engine,
+        shard=part,
+        scheduler=scheduler,
     )
     folder = results_folder(chosen, out)
     given = {
         axis: found for axis, found in asdict(selection).items() if found != getattr(NONE, axis)
     }
     runner.run_study(chosen, folder, settings, f"dikbench.run_study({study!r}, **{given})")
-    if report:
+    if report and part == WHOLE:
         write_report(folder)
     return load_results(folder)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -202,13 +202,30 @@ def _version(environment: dict[str, Any]) -> str:
     return f"{version} (commit {commit[:8]}{'+' * commit.endswith('+')})" if commit else version
 
 
-def _other_metrics(manifest: dict[str, Any]) -> dict[str, tuple[str, str]]:
-    """Return unit and definition of the metrics of other authors that a manifest describes."""
+def metrics_described(manifest: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return what a manifest says of metrics of other authors, by name."""
     told = manifest.get("metrics")
+    found = told.items() if isinstance(told, dict) else ()
+    return {str(name): each for name, each in found if isinstance(each, dict)}
+
+
+def metrics_in(path: Path) -> dict[str, dict[str, Any]]:
+    """Return what a results folder says of metrics of other authors; nothing where it has none."""
+    folder = ResultsFolder(path)
+    try:
+        if folder.database.is_file():
+            with folder.open_store() as store:
+                return store.other_metrics
+        return metrics_described(read_manifest(path))
+    except DikbenchError:  # which is told when its rows are read
+        return {}
+
+
+def _other_metrics(manifest: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
+    """Return unit and definition of the metrics of other authors that a manifest describes."""
     return {
-        str(name): (str(each.get("unit", "")), str(each.get("definition", "")))
-        for name, each in (told.items() if isinstance(told, dict) else ())
-        if isinstance(each, dict)
+        name: (str(each.get("unit", "")), str(each.get("definition", "")))
+        for name, each in metrics_described(manifest).items()
     }
 
 

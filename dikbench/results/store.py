@@ -246,20 +246,24 @@ class Store:
             "WHERE NOT superseded GROUP BY solver, environment ORDER BY MIN(run), environment"
         )
         found = versions_of_rows(
-            self._last_run(), [(solver, name, json.loads(text)) for solver, name, text in made]
+            self.runs()[-1], [(solver, name, json.loads(text)) for solver, name, text in made]
         )
         return {**found, "metrics": self.other_metrics} if self.other_metrics else found
 
-    def _last_run(self) -> dict[str, Any]:
-        rows = self._rows("SELECT manifest FROM runs ORDER BY id DESC LIMIT 1")
+    def runs(self) -> list[dict[str, Any]]:
+        """Return the descriptions of all runs, in their order.
+
+        Raises:
+            DikbenchError: if there was none.
+        """
+        rows = self._rows("SELECT manifest FROM runs ORDER BY id")
         if not rows:
             raise DikbenchError(f"store {self.path}: it holds no run")
-        found: dict[str, Any] = json.loads(rows[0][0])
-        return found
+        return [json.loads(text) for (text,) in rows]
 
     def note(self, key: str, value: Any) -> None:
         """Add an entry to the description of the last run."""
-        noted = [json.dumps({**self._last_run(), key: value})]
+        noted = [json.dumps({**self.runs()[-1], key: value})]
         last = "(SELECT MAX(id) FROM runs)"
         with self._guarded():
             self._database.execute(f"UPDATE runs SET manifest = ? WHERE id = {last}", noted)

@@ -66,6 +66,24 @@ def is_outdated(solver: str, made: Mapping[str, Any] | None, now: Mapping[str, A
     )  # fmt: skip
 
 
+def differences(
+    one: Mapping[str, Any], other: Mapping[str, Any], solvers: Iterable[str]
+) -> list[str]:
+    """Say in which sources and versions two descriptions differ that change what is computed.
+
+    Args:
+        one: the description of a process.
+        other: that of another one.
+        solvers: names of the solvers that count.
+    """
+    pairs = {key: (one.get(key), other.get(key)) for key in SOURCES}
+    a, b = one.get("libraries", {}), other.get("libraries", {})
+    pairs |= {name: (a.get(name), b.get(name)) for name in {**a, **b}}
+    a, b = one.get("solvers", {}), other.get("solvers", {})
+    pairs |= {name: (a.get(name), b.get(name)) for name in solvers}
+    return [f"{name} {a or 'none'} and {b or 'none'}" for name, (a, b) in pairs.items() if a != b]
+
+
 def _each(found: Iterable[Mapping[str, Any]], last: Mapping[str, Any]) -> dict[str, Any]:
     """Return the versions of every name, those found before that of the last run."""
     versions: dict[str, list[Any]] = {name: [] for name in last}

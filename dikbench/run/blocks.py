@@ -67,7 +67,7 @@ def engine_of(planned: Sequence[PlannedTrial], choice: EngineChoice, store: Stor
     if any(trial.reference != "time" for trial in trials):
         return "alone"
     kinds = Counter(
-        (*_like(trial.scenario), trial.plant)
+        (*family_and_robot(trial.scenario), trial.plant)
         for trial in trials
         if trial.formulation.name not in ORACLES and is_batched(make_formulation(trial.formulation))
     )
@@ -83,7 +83,7 @@ def blocks_of(ordered: Sequence[PlannedTrial], jobs: int) -> list[list[PlannedTr
     scenarios = [
         list(group) for _, group in groupby(ordered, key=lambda p: (p.trial.scenario, p.trial.seed))
     ]
-    scenarios.sort(key=lambda trials: _like(trials[0].trial.scenario))
+    scenarios.sort(key=lambda trials: family_and_robot(trials[0].trial.scenario))
     most = max(1, min(MOST_SCENARIOS, len(scenarios) // (BLOCKS_PER_WORKER * jobs)))
     blocks: list[list[PlannedTrial]] = []
     held = 0
@@ -96,7 +96,8 @@ def blocks_of(ordered: Sequence[PlannedTrial], jobs: int) -> list[list[PlannedTr
     return blocks
 
 
-def _like(scenario: Selector) -> tuple[str, str]:
+def family_and_robot(scenario: Selector) -> tuple[str, str]:
+    """Return what scenarios share that can be built and run together."""
     return scenario.name, str(dict(scenario.parameters).get("robot", ""))
 
 

@@ -3,29 +3,19 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from multiprocessing import active_children
-from typing import Any, Final
-
-from pebble import ProcessExpired
 
 from dikbench.results.folder import ResultsFolder
-from dikbench.run.blocks import Engine, EngineChoice, block_timeout, blocks_of, smaller
-from dikbench.run.pool import end_group, workers
-from dikbench.run.trial_row import CannotStore, TracePolicy, TrialRow, row_without_run, work
-from dikbench.run.trials_together import work_together
+from dikbench.run.block_work import Block, BlockSettings, Executor
+from dikbench.run.blocks import Engine, EngineChoice, blocks_of, smaller
+from dikbench.run.on_this_machine import on_this_machine
+from dikbench.run.shards import WHOLE, Shard
+from dikbench.run.trial_row import TracePolicy, TrialRow, row_without_run
 from dikbench.selector import Selector
 from dikbench.simulation.status import Status
 from dikbench.study.plan import PlannedTrial
-from dikbench.study.trial import Trial
-
-TRIALS_HANDED_AHEAD_PER_WORKER: Final = 8
-"""So many that no worker waits, and few enough that memory does not grow."""
-
-WORK: Final = (work.__module__, work_together.__module__)
-"""Modules that each worker imports at its start."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +31,9 @@ class RunSettings:
         rerun: which finished trials are run again: "", "failed", "outdated" (made by other sources
             or versions), "all", or the selector (or the name) of a formulation, scenario or solver.
         metrics: metrics of other authors that are computed in addition.
+        shard: the part of the study that is run.
+        scheduler: address of the scheduler of a dask cluster, or its file, on whose workers trials
+            run; empty: on this machine.
     """
 
     jobs: int
@@ -50,6 +43,8 @@ class RunSettings:
     rerun: str = ""
     engine: EngineChoice = "auto"
     metrics: tuple[str, ...] = ()
+    shard: Shard = WHOLE
+    scheduler: str = ""
 
 
 def run_trials(
@@ -63,7 +58,7 @@ def run_trials(
     """Run trials in worker processes and yield rows when they are finished, together or singly.
 
     Raises:
-        DikbenchError: if a trace cannot be written.
+        DikbenchError: if a trace cannot be written, or the cluster cannot be reached.
     """
     if skipped := [p for p in todo if p.skip]:
         yield [(p, row_without_run(p.trial, Status.SKIPPED, p.skip)) for p in skipped]
@@ -75,80 +70,43 @@ def run_trials(
         (p for p in todo if not p.skip), key=lambda p: first[p.trial.scenario, p.trial.seed]
     )
     blocks = [[p] for p in ordered] if engine == "alone" else blocks_of(ordered, settings.jobs)
-    yield from _run_blocks(deque(blocks), folder, settings, commit, command, engine)
+    if not blocks:
+        return
+    how = BlockSettings(
+        engine,
+        settings.trial_timeout,
+        settings.trial_memory,
+        settings.traces,
+        commit,
+        command,
+        settings.metrics,
+    )
+    with _executor(settings, folder, how) as executor:
+        yield from _run_blocks(deque(blocks), executor)
+
+
+def _executor(
+    settings: RunSettings, folder: ResultsFolder, how: BlockSettings
+) -> AbstractContextManager[Executor]:
+    if settings.scheduler:
+        from dikbench.run.on_dask import on_dask
+
+        return on_dask(settings.scheduler, folder, how)
+    return on_this_machine(settings.jobs, folder, how)
 
 
 def _run_blocks(
-    waiting: deque[list[PlannedTrial]],
-    folder: ResultsFolder,
-    settings: RunSettings,
-    commit: str | None,
-    command: str,
-    engine: Engine,
+    waiting: deque[Block], executor: Executor
 ) -> Iterator[list[tuple[PlannedTrial, TrialRow]]]:
-    """Run blocks of trials in worker processes; what kills its worker is run in smaller ones."""
-    most = TRIALS_HANDED_AHEAD_PER_WORKER * settings.jobs
-    given = settings.traces, commit, command, settings.metrics
-    processes: set[int] = set()
-    try:
-        with workers(settings.jobs, WORK, settings.trial_memory) as pool:
-            running: dict[Future[Any], list[PlannedTrial]] = {}
-            while True:
-                while waiting and len(running) < most:
-                    block = waiting.popleft()
-                    traces = [folder.trace(p.id) for p in block]
-                    timeout = settings.trial_timeout
-                    if engine == "alone":
-                        arguments: tuple[Any, ...] = (block[0].trial, traces[0], *given)
-                        function: Callable[..., Any] = work
-                    else:  # of one trial, too: its numbers are then those beside others
-                        arguments = ([p.trial for p in block], traces, *given)
-                        function = work_together
-                        timeout = block_timeout(len(block), timeout)
-                    future = pool.schedule(function, args=arguments, timeout=timeout)
-                    running[future] = block
-                if not running:
-                    return
-                processes.update(child.pid for child in active_children() if child.pid)
-                for future in wait(running, return_when=FIRST_COMPLETED).done:
-                    block = running.pop(future)
-                    if len(block) == 1:
-                        yield [(block[0], _row(future, block[0].trial, settings.trial_timeout))]
-                    elif (rows := _rows(future)) is None:
-                        waiting.extendleft(smaller(block))
-                    else:
-                        yield [*zip(block, rows, strict=True)]
-    finally:
-        for process in processes:
-            end_group(process)
-
-
-def _rows(future: Future[Any]) -> list[TrialRow] | None:
-    """Return the rows of a finished block; None where one of its trials ended its worker."""
-    try:
-        rows, described = future.result()
-    except CannotStore:
-        raise
-    except Exception:
-        return None
-    return [{**row, "described": described} for row in rows]
-
-
-def _row(future: Future[Any], trial: Trial, timeout: float) -> TrialRow:
-    """Return the row of a finished trial, however it ended."""
-    try:
-        made, described = future.result()
-    except CannotStore:
-        raise
-    except TimeoutError:
-        return row_without_run(trial, Status.TIMEOUT, f"not finished after {timeout:g} s")
-    except ProcessExpired as error:
-        reason = f"the worker ended with exit code {error.exitcode}"
-        return row_without_run(trial, Status.CRASHED, reason)
-    except MemoryError:
-        return row_without_run(trial, Status.OUT_OF_MEMORY, "out of memory")
-    except Exception as error:
-        reason = f"{type(error).__name__}: {error}".partition("\n")[0]
-        return row_without_run(trial, Status.FORMULATION_ERROR, reason)
-    [row] = made if isinstance(made, list) else [made]
-    return {**row, "described": described}
+    """Run blocks of trials; what kills its worker is run in smaller ones."""
+    while waiting or executor.is_busy():
+        while waiting and executor.has_room():
+            executor.give(waiting.popleft())
+        done: list[tuple[PlannedTrial, TrialRow]] = []
+        for block, rows in executor.finished():
+            if rows is None:
+                waiting.extendleft(smaller(block))
+            else:
+                done += zip(block, rows, strict=True)
+        if done:
+            yield done  # in one transaction, which costs more than a row

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from dikbench.errors import DikbenchError, unknown
 from dikbench.metrics import take_errors
 from dikbench.results.columns import TRIAL
 from dikbench.results.folder import ResultsFolder
 from dikbench.results.peers import write_peers
+from dikbench.results.shards import SHARD, TRIALS_OF_SHARD, trials_to_run
 from dikbench.results.store import Store
-from dikbench.run.blocks import (
-    engine_of,
-)
+from dikbench.run.blocks import engine_of
 from dikbench.run.folder_of_instances import instances_in
 from dikbench.run.folder_of_study import store_for
 from dikbench.run.in_workers import RunSettings, run_trials
@@ -27,12 +26,13 @@ from dikbench.run.peers import compare_with_peers, pairs_of, with_ticks
 from dikbench.run.pool import THREAD_VARIABLES, workers
 from dikbench.run.progress_display import ProgressDisplay
 from dikbench.run.provenance import environment, git_commit, manifest
+from dikbench.run.shards import WHOLE, trials_of_shard
 from dikbench.run.timing import time_scenario, to_time
 from dikbench.run.trial_row import TrialRow
 from dikbench.scenario.oracle import ORACLES
 from dikbench.selector import parse_selector
 from dikbench.simulation.status import Status
-from dikbench.study.identity import timing_id, trial_id_today
+from dikbench.study.identity import sources_of, timing_id, trial_id_today
 from dikbench.study.plan import PlannedTrial, expand
 from dikbench.study.study import Study
 from dikbench.study.trial import Trial
@@ -40,8 +40,14 @@ from dikbench.study.trial import Trial
 TIMING_TIMEOUT_S: Final = 900.0
 """Wall-clock limit of the timing of one scenario."""
 
+OF_THE_TRIALS: Final = ("engine", "sources", SHARD, TRIALS_OF_SHARD)
+"""Entries of the description of a run that stay when times alone are taken."""
+
 MISSING: Final = "missing"
 """What the status of a trial without a row is called."""
+
+OF_OTHER_SHARDS: Final = "missing, of other shards"
+"""... and one of a shard that the folder has not run."""
 
 OUTDATED: Final = "outdated"
 RERUNS: Final = ("failed", OUTDATED, "all")
@@ -54,6 +60,9 @@ class Interrupted(Exception):
 
 def run_study(study: Study, out: Path, settings: RunSettings, command: str) -> ResultsFolder:
     """Run what is missing of a study in a results folder: trials, then times.
+
+    A shard takes no times, since those that are compared are of one machine: they are taken when
+    the study is run in the merged folder.
 
     Args:
         study: what to run.
@@ -79,6 +88,10 @@ def run_study(study: Study, out: Path, settings: RunSettings, command: str) -> R
         hidden = store.hidden()
         engine = engine_of(planned, settings.engine, store)
         described = {**manifest(study, len(planned), own), "engine": engine}
+        described["sources"] = sources_of(p.trial for p in planned)
+        chosen = trials_of_shard(planned, settings.shard, engine)
+        if settings.shard != WHOLE:
+            described |= {SHARD: str(settings.shard), TRIALS_OF_SHARD: len(chosen)}
         run = store.begin_run(described, planned)
         if hides := store.hidden() - hidden:
             print(
@@ -89,11 +102,11 @@ def run_study(study: Study, out: Path, settings: RunSettings, command: str) -> R
         outdated = store.outdated(own) if settings.rerun == OUTDATED else set()
         todo = [
             p
-            for p in planned
+            for p in chosen
             if p.id not in done or p.id in outdated or _again(p, done[p.id], settings.rerun)
         ]
-        if len(todo) < len(planned):
-            print(f"{len(planned) - len(todo)} of {len(planned)} trials are done", file=sys.stderr)
+        if len(todo) < len(chosen):
+            print(f"{len(chosen) - len(todo)} of {len(chosen)} trials are done", file=sys.stderr)
         errors: dict[str, str] = {}
         try:
             with ProgressDisplay(len(todo), "trials") as display:
@@ -106,13 +119,13 @@ def run_study(study: Study, out: Path, settings: RunSettings, command: str) -> R
                     )
                     display.advance(len(rows))
             tell(errors)
-            if study.timing is not None:
+            if study.timing is not None and settings.shard == WHOLE:
                 known = set() if settings.rerun == "all" else store.timed() - outdated
                 _time(folder, store, run, study, planned, known, worker)
         except KeyboardInterrupt:
-            finished = sum(p.id in store.statuses() for p in planned)
+            finished = len(store.statuses().keys() & {p.id for p in chosen})
             folder.export(store)
-            raise Interrupted(f"{finished} of {len(planned)} trials are done and kept") from None
+            raise Interrupted(f"{finished} of {len(chosen)} trials are done and kept") from None
         folder.export(store)
         store.close_neatly()
     return folder
@@ -136,7 +149,8 @@ def time_study(study: Study, out: Path, command: str) -> ResultsFolder:
     folder = ResultsFolder(out)
     with store_for(folder, study) as store:
         described = environment(git_commit(), command)
-        run = store.begin_run(manifest(study, len(planned), described), planned)
+        kept = {key: value for key, value in _last_run(store).items() if key in OF_THE_TRIALS}
+        run = store.begin_run({**manifest(study, len(planned), described), **kept}, planned)
         try:
             _time(folder, store, run, study, planned, set(), described)
         except KeyboardInterrupt:
@@ -144,6 +158,14 @@ def time_study(study: Study, out: Path, command: str) -> ResultsFolder:
         folder.export(store)
         store.close_neatly()
     return folder
+
+
+def _last_run(store: Store) -> Mapping[str, Any]:
+    """Return the description of the last run; empty where there was none."""
+    try:
+        return store.runs()[-1]
+    except DikbenchError:
+        return {}
 
 
 def _check_rerun(rerun: str, planned: Sequence[PlannedTrial]) -> None:
@@ -270,11 +292,13 @@ def status_of(out: Path) -> dict[str, int]:
         DikbenchError: if the folder holds no results.
     """
     with ResultsFolder(out).open_store() as store:
-        planned, number = store.planned(), int(store.manifest()["trials"])
+        planned, runs = store.planned(), store.runs()
     cells = planned[TRIAL].itertuples(index=False, name=None)
     counts: Counter[str] = Counter()
     for name, status, cell in zip(planned["id"], planned["status"], cells, strict=True):
         today = trial_id_today(dict(zip(TRIAL, cell, strict=True)))
         counts[status if today in {None, name} else MISSING] += 1
+    number = trials_to_run(runs)
     counts[MISSING] += number - len(planned)
+    counts[OF_OTHER_SHARDS] = int(runs[-1]["trials"]) - number
     return dict(+counts)

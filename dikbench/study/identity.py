@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os.path
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import astuple, fields, is_dataclass
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
@@ -43,16 +43,36 @@ def trial_id(trial: Trial) -> str:
         DikbenchError: if a selector does not name anything valid.
     """
     cell = timing_id(trial.formulation, trial.solver, trial.scenario)
-    plant = (trial.plant.name, *astuple(make_plant(trial.plant)))
-    if trial.plant.name not in PLANTS:
-        plant += (source_digest(plant_plugin(trial.plant.name)),)
-    how = (*plant, trial.reference, trial.seed)
+    how = (*_plant(trial.plant), trial.reference, trial.seed)
     return digest(json.dumps((cell, *how)))
 
 
 def timing_id(formulation: Selector, solver: Selector, scenario: Selector) -> str:
     """Return the id of what is timed: `trial_id` without how a trial is run."""
     return digest(json.dumps((_formulation(formulation), _solver(solver), scenario_id(scenario))))
+
+
+def sources_of(trials: Iterable[Trial]) -> dict[str, str]:
+    """Return a hash for each name among trials, of all in their ids that was given it.
+
+    Two processes that have the same trials in mind have the same hashes, if they have the same
+    sources; the names of those that differ say what is another one.
+    """
+    found: dict[str, dict[str, None]] = {}
+    for trial in trials:
+        for (axis, name), text in parts_of(trial).items():
+            found.setdefault(f"{axis} {name}", {})[text] = None
+    return {name: digest(json.dumps(sorted(texts))) for name, texts in sorted(found.items())}
+
+
+def parts_of(trial: Trial) -> dict[tuple[str, str], str]:
+    """Return the ids of the parts of a trial by axis and name."""
+    return {
+        ("formulation", trial.formulation.name): _formulation(trial.formulation),
+        ("solver", trial.solver.name): _solver(trial.solver),
+        ("scenario", trial.scenario.name): scenario_id(trial.scenario),
+        ("plant", trial.plant.name): json.dumps(_plant(trial.plant)),
+    }
 
 
 def trial_id_today(row: Mapping[str, Any]) -> str | None:
@@ -114,6 +134,14 @@ def _described_solver(solver: Solver) -> list[Any]:
     own = find_back_end(solver.name)
     source = [] if own.found is None else [_source(own.found), _version(own.package)]
     return [solver.name, solver.interface, settings, solver.tolerance, *source, *then]
+
+
+@lru_cache(maxsize=4096)
+def _plant(selector: Selector) -> tuple[Any, ...]:
+    plant = (selector.name, *astuple(make_plant(selector)))
+    if selector.name not in PLANTS:
+        plant += (source_digest(plant_plugin(selector.name)),)
+    return plant
 
 
 def _source(found: Named) -> str:

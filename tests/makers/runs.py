@@ -14,7 +14,7 @@ import pytest
 from dikbench.report import write
 from dikbench.report.interactive import replays
 from dikbench.results.folder import ResultsFolder
-from dikbench.run import in_workers, recompute, runner
+from dikbench.run import on_this_machine, recompute, runner
 from dikbench.run.in_workers import RunSettings
 from dikbench.run.runner import run_study
 from dikbench.study.study import Study, TimingSettings
@@ -47,7 +47,7 @@ def _no_workers(*given: object) -> Iterator[_NoPool]:
 def without_workers() -> Iterator[None]:
     """Have the harness run, time, recompute and replay trials in this process meanwhile."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in (in_workers, runner, recompute, replays):
+        for module in (on_this_machine, runner, recompute, replays):
             patch.setattr(module, "workers", _no_workers)
         yield
 

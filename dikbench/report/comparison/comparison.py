@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
-from dikbench.metrics import METRICS
 from dikbench.report.comparison.differences import formulation_differences, trial_differences
 from dikbench.report.comparison.gate import breaches
-from dikbench.report.comparison.matching import MatchedTrials, match_trials
+from dikbench.report.comparison.matching import Best, MatchedTrials, match_trials
 from dikbench.report.comparison.success_changes import success_changes
-from dikbench.report.comparison.times import time_ratios
-from dikbench.report.comparison.tolerances import Tolerance
+from dikbench.report.comparison.times import COMPARED, time_ratios
+from dikbench.report.comparison.tolerances import SUCCESS, Tolerance
 from dikbench.report.comparison.versions import same_machine, version_differences
-from dikbench.results.reading import read_results, without_attributes
+from dikbench.results.reading import metrics_described, read_results, without_attributes
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +72,9 @@ def compare(a: Path, b: Path, tolerances: Sequence[Tolerance] = ()) -> Compariso
             is on a metric that one of them lacks.
     """
     of_a, of_b = (without_attributes(read_results(folder)) for folder in (a, b))
-    matched = match_trials(of_a.trials, of_b.trials, (str(a), str(b)))
-    on_metrics = [tolerance for tolerance in tolerances if tolerance.metric in METRICS]
+    others = _in_both(of_a.manifest, of_b.manifest)
+    matched = match_trials(of_a.trials, of_b.trials, (str(a), str(b)), others)
+    on_metrics = [each for each in tolerances if each.metric not in (SUCCESS, *COMPARED)]
     formulations = formulation_differences(matched, on_metrics)
     success, times = success_changes(matched), time_ratios(matched)
     return Comparison(
@@ -88,3 +89,13 @@ def compare(a: Path, b: Path, tolerances: Sequence[Tolerance] = ()) -> Compariso
         bool(tolerances),
         breaches(matched, formulations, success, times, tolerances),
     )
+
+
+def _in_both(a: Mapping[str, Any], b: Mapping[str, Any]) -> dict[str, Best]:
+    """Return the metrics of other authors that both manifests describe alike, and what is best."""
+    of_a, of_b = metrics_described(a), metrics_described(b)
+    return {
+        name: "low" if each.get("best") == "low" else "high"
+        for name, each in of_a.items()
+        if name in of_b and each.get("best") == of_b[name].get("best")
+    }

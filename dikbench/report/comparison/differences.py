@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -10,8 +10,7 @@ import pandas as pd
 
 from dikbench.arrays import Array
 from dikbench.errors import DikbenchError
-from dikbench.metrics import METRICS
-from dikbench.report.comparison.matching import MatchedTrials
+from dikbench.report.comparison.matching import Best, MatchedTrials
 from dikbench.report.comparison.tolerances import Tolerance
 from dikbench.results.columns import TRIAL
 from dikbench.statistics.hierarchical_bootstrap import draw_weights, mean_intervals
@@ -40,12 +39,12 @@ def difference(a: Array, b: Array) -> Array:
     return np.where(same, 0.0, apart)
 
 
-def worsening(metric: str, a: Array, b: Array) -> Array:
-    """How much worse B is than A, negative where it is better.
+def worsening(best: Best, a: Array, b: Array) -> Array:
+    """How much worse B is than A, negative where it is better, by what is best of a metric.
 
     Infinite where B is no longer defined; 0 where only A was not.
     """
-    sign = 1.0 if METRICS[metric].best == "low" else -1.0
+    sign = 1.0 if best == "low" else -1.0
     worse = sign * difference(a, b)
     return np.where(np.isnan(worse), np.where(np.isnan(b), np.inf, 0.0), worse)
 
@@ -59,7 +58,7 @@ def trial_differences(matched: MatchedTrials) -> pd.DataFrame:
     columns = [*TRIAL, "metric", "a", "b", "difference", "worsening"]
     frames, severities = [pd.DataFrame(columns=columns)], [np.empty(0)]
     for metric, (a, b) in _values(matched).items():
-        apart, worse = difference(a, b), worsening(metric, a, b)
+        apart, worse = difference(a, b), worsening(matched.metrics[metric], a, b)
         changed = apart != 0
         frames.append(
             _trials(matched)
@@ -113,7 +112,10 @@ def formulation_differences(
         changed = {m: (a, b) for m, (a, b) in here.items() if (difference(a, b) != 0).any()}
         if changed:
             named = dict(zip(GROUPS, group, strict=True))
-            rows += [{**named, **row} for row in _rows(trials.iloc[places], changed, tolerances)]
+            rows += [
+                {**named, **row}
+                for row in _rows(trials.iloc[places], changed, matched.metrics, tolerances)
+            ]
     if not rows:
         return pd.DataFrame()
     table = pd.DataFrame(rows)
@@ -124,6 +126,7 @@ def formulation_differences(
 def _rows(
     trials: pd.DataFrame,
     changed: dict[str, tuple[Array, Array]],
+    best: Mapping[str, Best],
     tolerances: Sequence[Tolerance],
 ) -> list[dict[str, Any]]:
     """Return the rows of one formulation: per metric that changed its values in A and B, (n,)."""
@@ -135,7 +138,7 @@ def _rows(
     intervals = mean_intervals(np.column_stack(list(finite.values())), weights)
     rows = []
     for (metric, (a, b)), interval in zip(changed.items(), intervals, strict=True):
-        worse = worsening(metric, a, b)
+        worse = worsening(best[metric], a, b)
         beyond = [t.exceeded(worse, a) for t in tolerances if t.metric == metric]
         worst = int(np.argmax(worse))
         defined = ~np.isnan(finite[metric])

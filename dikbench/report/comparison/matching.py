@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import pandas as pd
 
@@ -16,6 +16,9 @@ from dikbench.results.columns import SELECTORS, TRIAL
 from dikbench.results.selected import selected_columns
 from dikbench.simulation.status import Status
 from dikbench.study.trial import Trial
+
+Best = Literal["low", "high"]
+"""What is best of a metric."""
 
 RANKS: Final[Mapping[str, int]] = MappingProxyType({Status.OK.value: 2, Status.SKIPPED.value: 1})
 """How good a status is; every other one is a failure, 0."""
@@ -31,7 +34,7 @@ class MatchedTrials:
     Attributes:
         a, b: the rows of the trials that both have, row by row the same trial.
         only_a, only_b: the trials that one of them has alone, columns `TRIAL` and `status`.
-        metrics: the metrics that both have, in the registry's order.
+        metrics: the metrics that both have, in the registry's order, and what is best of each.
         unmatched_columns: what is said of metrics that are not compared.
     """
 
@@ -39,7 +42,7 @@ class MatchedTrials:
     b: pd.DataFrame
     only_a: pd.DataFrame
     only_b: pd.DataFrame
-    metrics: tuple[str, ...]
+    metrics: Mapping[str, Best]
     unmatched_columns: tuple[str, ...]
 
     @cached_property
@@ -92,7 +95,10 @@ class MatchedTrials:
 
 
 def match_trials(
-    a: pd.DataFrame, b: pd.DataFrame, names: tuple[str, str] = ("A", "B")
+    a: pd.DataFrame,
+    b: pd.DataFrame,
+    names: tuple[str, str] = ("A", "B"),
+    others: Mapping[str, Best] = MappingProxyType({}),
 ) -> MatchedTrials:
     """Match the trials of two folders by formulation, solver, scenario, plant, reference and seed.
 
@@ -100,6 +106,7 @@ def match_trials(
         a: the rows of trials.csv of the one.
         b: of the other.
         names: how the folders are called in errors.
+        others: the metrics of other authors that are the same in both, and what is best of each.
 
     Raises:
         DikbenchError: if one is empty or holds a trial twice, or they have no trial or no metric in
@@ -117,7 +124,8 @@ def match_trials(
     both = a[TRIAL].assign(at_a=range(len(a))).merge(b[TRIAL].assign(at_b=range(len(b))), on=TRIAL)
     if both.empty:
         raise DikbenchError(f"{names[0]} and {names[1]} have no trial in common")
-    metrics = tuple(name for name in METRICS if name in a and name in b)
+    every = {**{name: metric.best for name, metric in METRICS.items()}, **others}
+    metrics = {name: best for name, best in every.items() if name in a and name in b}
     if not metrics:
         raise DikbenchError(f"{names[0]} and {names[1]} have no metric in common")
     return MatchedTrials(

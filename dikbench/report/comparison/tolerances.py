@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
@@ -42,11 +43,15 @@ class Tolerance:
         return beyond
 
 
-def parse_tolerance(text: str) -> Tolerance:
+def parse_tolerance(text: str, others: Iterable[str] = ()) -> Tolerance:
     """Read `position_error_rms_m=1e-6` (in the metric's unit), `position_error_rms_m=5%`.
 
     `success=2%` (or 0.02) is in points of the rate of success; times are given in percent of their
     value in A only.
+
+    Args:
+        text: the tolerance.
+        others: metrics of other authors that may be named.
 
     Raises:
         DikbenchError: if it is none of them, or there is no such metric.
@@ -73,7 +78,7 @@ def parse_tolerance(text: str) -> Tolerance:
             f"tolerance {text!r}: times are compared as ratios, on whatever machine; give a share "
             f"of the time in A, such as {name}=20%"
         )
-    if name not in {*METRICS, SUCCESS, *COMPARED}:
-        known = [*METRICS, SUCCESS, *COMPARED]
+    known = [*METRICS, *others, SUCCESS, *COMPARED]
+    if name not in known:
         raise unknown("metric", name, known, f"in tolerance {text!r}", "dikbench list metrics")
     return Tolerance(name, bound, percent and name != SUCCESS)

@@ -122,13 +122,16 @@ def test_a_selector_is_valid_or_one_line(text: str) -> None:
 OPTIONS = (
     "--formulation", "--scenario", "--solver", "--seed", "--plant", "--reference", "--jobs",
     "--out", "--rerun", "--trial-timeout", "--trial-memory", "--traces", "--help", "-h",
+    "--shard", "--executor", "--scheduler",
 )  # fmt: skip
 
 command_lines = st.lists(
     st.one_of(
         st.sampled_from(OPTIONS),
-        st.sampled_from(["run", "time", "status", "list", "show", "quick", "smoke"]),
-        st.sampled_from(["dls", "qp", "daqp", "reach[duration=0.1]", "ideal", "1", "failed"]),
+        st.sampled_from(["run", "time", "status", "list", "show", "merge", "quick", "smoke"]),
+        st.sampled_from(
+            ["dls", "qp", "daqp", "reach[duration=0.1]", "ideal", "1", "failed", "2/3", "dask"]
+        ),
         texts,
     ),
     min_size=1,

@@ -126,7 +126,7 @@ def test_times_are_kept_and_taken_anew_on_request(tmp_path: Path) -> None:
     study = msgspec.structs.replace(
         STUDY, scenarios=STUDY.scenarios[:1], timing=TimingSettings("dls", problems=10, rounds=3)
     )
-    run_here(study, tmp_path, RunSettings(jobs=1, traces="none"), "first")
+    run_here(study, tmp_path, RunSettings(jobs=1, traces="none", engine="lockstep"), "first")
     assert list((tmp_path / "traces").iterdir()) == []
 
     def stamps() -> list[int]:
@@ -139,6 +139,7 @@ def test_times_are_kept_and_taken_anew_on_request(tmp_path: Path) -> None:
     with without_workers():
         time_study(study, tmp_path, "third")
     assert stamps() == [3, 3, 3]
+    assert load_results(tmp_path).manifest["engine"] == "lockstep"  # of the trials that are there
     assert len(pd.read_csv(tmp_path / "timing.csv")) == 3
     assert status_of(tmp_path) == {"ok": 3}
     with pytest.raises(DikbenchError, match=r"no section \[timing\]"):

@@ -254,3 +254,46 @@ def test_cells_that_both_skipped_are_no_trials_in_both(tmp_path: Path) -> None:
     rows = make_rows({"a": {}, "b": {"status": "skipped", "outcome": ""}}, ("reach", "step"))
     said = dikbench(write_results(tmp_path / "a", rows), tmp_path / "a").output
     assert "2 trials in both, of which 2 ended ok in both. 2 cells skipped in both." in said
+
+
+def _with_own(rows: pd.DataFrame) -> pd.DataFrame:
+    return rows.assign(ease=0.5, toil=0.5)
+
+
+def _described(**best: str) -> dict[str, dict[str, str]]:
+    return {name: {"selector": f"m.py:{name}", "best": value} for name, value in best.items()}
+
+
+@pytest.mark.parametrize(("metric", "worse"), [("ease", 0.4), ("toil", 0.6)])
+def test_metrics_of_others_are_compared_in_their_direction(
+    folder: Callable[..., Path], metric: str, worse: float
+) -> None:
+    """What is best of them says the manifest; they have tolerances like those of dikbench."""
+
+    def tamper(rows: pd.DataFrame) -> pd.DataFrame:
+        changed = _with_own(rows)
+        changed.loc[9, metric] = worse
+        return changed
+
+    described = _described(ease="high", toil="low")
+    a, b = folder("a", _with_own, metrics=described), folder("b", tamper, metrics=described)
+    for first, second, code in ((a, b, 1), (b, a, 0)):
+        assert dikbench(first, second, "--tolerance", f"{metric}=0.05").exit_code == code
+    assert dikbench(a, b, "--tolerance", f"{metric}=0.15").exit_code == 0
+    [line] = lines_of(dikbench(a, b))
+    assert line.split("|")[1].strip() == metric
+
+
+def test_a_metric_that_one_folder_lacks_has_no_tolerance(folder: Callable[..., Path]) -> None:
+    """Nor one of which the two say otherwise what is best, nor one that nobody knows."""
+    described = _described(ease="high", toil="low")
+    a = folder("a", _with_own, metrics=described)
+    other = folder("other", _with_own, metrics=_described(ease="low", toil="low"))
+    for b, name, said in (
+        (folder("b"), "ease", "one of the folders lacks this metric"),
+        (other, "ease", "one of the folders lacks this metric"),
+        (other, "sloth", "unknown metric 'sloth'"),
+    ):
+        done = dikbench(a, b, "--tolerance", f"{name}=0.1")
+        assert done.exit_code == 2
+        assert said in done.output

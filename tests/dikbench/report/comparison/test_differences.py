@@ -63,7 +63,7 @@ def test_undefined_and_infinite_values(
     """The same on both sides is no difference; on one side it is one, worse where B lost it."""
     a, b = np.array([before]), np.array([after])
     np.testing.assert_equal(difference(a, b), [apart])
-    np.testing.assert_equal(worsening("position_error_rms_m", a, b), [worse])
+    np.testing.assert_equal(worsening("low", a, b), [worse])
 
 
 def test_times_are_ratios_with_their_doubts(folder: Callable[..., Path]) -> None:
