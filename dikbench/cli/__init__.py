@@ -17,6 +17,7 @@ from dikbench.cli.reading_commands import compare, replay, table
 from dikbench.cli.reproducing_command import reproduce
 from dikbench.cli.study_options import JOBS_OPTION, METRIC_OPTION, study_options
 from dikbench.cli.tuning_command import tune
+from dikbench.cli.worst_command import worst
 
 EXIT_CODE_OF_STANDSTILL = 3
 """Exit code of a run in which no trial of a formulation took a step."""
@@ -292,3 +293,4 @@ commands.add_command(replay)
 commands.add_command(reproduce)
 commands.add_command(table)
 commands.add_command(tune)
+commands.add_command(worst)

@@ -113,7 +113,7 @@ def _run_blocks(
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
                     block = running.pop(future)
                     if len(block) == 1:
-                        yield [(block[0], _row(future, block[0].trial, settings.trial_timeout))]
+                        yield [(block[0], row_of(future, block[0].trial, settings.trial_timeout))]
                     elif (rows := _rows(future)) is None:
                         waiting.extendleft(smaller(block))
                     else:
@@ -134,7 +134,7 @@ def _rows(future: Future[Any]) -> list[TrialRow] | None:
     return [{**row, "described": described} for row in rows]
 
 
-def _row(future: Future[Any], trial: Trial, timeout: float) -> TrialRow:
+def row_of(future: Future[Any], trial: Trial, timeout: float) -> TrialRow:
     """Return the row of a finished trial, however it ended."""
     try:
         made, described = future.result()
