@@ -25,8 +25,8 @@ from dikbench.study.trial import Trial
 GENERATIONS: Final = 20
 """Generations of the search: the first is spread evenly, each further one improves on the last."""
 
-FEWEST_IN_GENERATION: Final = 5
-"""Differential evolution needs so many."""
+FEWEST_IN_GENERATION: Final = 8
+"""Differential evolution stalls with fewer."""
 
 
 @dataclass(frozen=True)
