@@ -57,8 +57,8 @@ def keep_worst(search: Search, solver: str, out: Path | None, settings: RunSetti
     folder = Path("runs") / folder_of(study) if out is None else out
     made = run_study(study, folder, replace(settings, traces="all"), shlex.join(command))
     with made.open_store() as store:
-        stored = store.planned().set_index("formulation")
-    rows = [stored.loc[str(each.formulation)] for each in search.contenders]
+        stored = {str(row["formulation"]): row for _, row in store.planned().iterrows()}
+    rows = [stored[str(each.formulation)] for each in search.contenders]
     same = all(_equal(row, kept) for row, kept in zip(case.rows, rows, strict=True))
     try:
         tried(search).to_csv(folder / "search.csv", index=False)

@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from dikbench.cli.advice_command import advise
 from dikbench.cli.checking import check
 from dikbench.cli.new_command import new
 from dikbench.cli.one_line_errors import one_line_errors
@@ -286,6 +287,7 @@ def show(name: str, figure: Path | None, instance: int | None) -> None:
     click.echo(text)
 
 
+commands.add_command(advise)
 commands.add_command(check)
 commands.add_command(compare)
 commands.add_command(new)
