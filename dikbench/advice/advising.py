@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import TimeoutError as NoTimeLeft
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -25,16 +24,22 @@ from dikbench.report.drawing.figure import Figure
 from dikbench.report.figures.phase_diagram import draw_phase_diagrams
 from dikbench.results.selected import with_selected
 from dikbench.run.in_workers import WORK, RunSettings
-from dikbench.run.pool import workers
+from dikbench.run.pool import available_cores, workers
 from dikbench.run.timing import time_scenario
 from dikbench.run.trial_row import TrialRow
 from dikbench.selector import Selector, parse_selector
 from dikbench.statistics.success import with_facts
 from dikbench.study.trial import NO_SOLVER, Trial
 
-PARTS: Final = (0.35, 0.62, 0.68, 0.82, 0.92)
-"""Shares of the budget at which end: trying all, trying those that go on, times, the search of the
-worst case, the phase diagram; the rest is for figures and the page."""
+SHORTEST_PAGE_S: Final = 6.0
+"""Time that figures, the page and the worst run take at least; where the machine is busy, as long
+as the start of the workers with the first case."""
+
+TIMES_S: Final = 4.0
+"""Time that the timing pass takes ..."""
+
+LONGEST_TIMES: Final = 3.0
+"""... and how many times that it may take."""
 
 OTHER_SOLVERS: Final = ("daqp[interface=warm]", "piqp")
 """Solvers with which the recommended formulation is timed beside its own."""
@@ -46,8 +51,12 @@ MISSES: Final = ("0.005", "0.01", "0.02", "0.05")
 SPEEDS: Final = ("0.1", "0.3", "1.0")
 """The grid of the phase diagram of near misses."""
 
+SEARCHED: Final = 120
+"""Cases of the search of the worst one for which time is kept ..."""
+
 FEWEST_SEARCHED: Final = 16
 MOST_SEARCHED: Final = 300
+"""... and how many it has at least and at most, by the time that is left then."""
 
 COMPARED: Final = "dls"
 """What the phase diagram shows beside what is recommended: what most people use."""
@@ -116,8 +125,14 @@ def advise(
     added = [each for each in contenders if each.formulation.name not in _shipped()]
     with workers(settings.jobs, WORK, settings.trial_memory) as pool:
         evaluate = evaluator(pool, limit)
+        page = max(SHORTEST_PAGE_S, _start(pool, clock))
+
+        def reserved(trial: float) -> float:
+            """Return how long all else takes [s], by the time of a trial."""
+            return page + TIMES_S + trial * (SEARCHED + 2 * len(MISSES) * len(SPEEDS))
+
         tries, went_on = try_all(
-            iter(cases), contenders, needs, evaluate, clock, PARTS[:2], progress, added
+            iter(cases), contenders, needs, evaluate, clock, reserved, progress, added
         )
         if not tries.rows:
             reasons = "; ".join(f"{family}: {why}" for family, why in cases.left_out.items())
@@ -128,11 +143,19 @@ def advise(
         if chosen is None:
             return replace(advice, no_search="nothing is recommended", no_phase="likewise")
         progress("times")
-        times = _times(pool, tries, chosen, clock)
+        times = _times(pool, tries, chosen)
         progress("the worst case")
-        search, no_search = _search(advice, cases, chosen, evaluate, clock, seed)
+        grid = 2 * len(MISSES) * len(SPEEDS) * tries.seconds_per_trial
+
+        def left_for_search() -> float:
+            return clock.left_until(1.0) - page - grid
+
+        def left_for_phase() -> float:
+            return clock.left_until(1.0) - page
+
+        search, no_search = _search(advice, cases, chosen, evaluate, left_for_search, seed)
         progress("the phase diagram")
-        phase, no_phase = _phase(cases, chosen, evaluate, clock)
+        phase, no_phase = _phase(cases, chosen, evaluate, left_for_phase)
         return replace(
             advice,
             times=times,
@@ -158,7 +181,13 @@ def chosen_contender(chosen: Standing) -> Contender:
     return Contender(parse_selector(chosen.formulation), parse_selector(chosen.solver))
 
 
-def _times(pool: Any, tries: Tries, chosen: Standing, clock: Clock) -> list[TrialRow]:
+def _start(pool: Any, clock: Clock) -> float:
+    """Start the workers; return how long that took since the clock began [s]."""
+    pool.schedule(available_cores).result()
+    return clock.spent * clock.budget
+
+
+def _times(pool: Any, tries: Tries, chosen: Standing) -> list[TrialRow]:
     """Time what is recommended, with its solver and some others, on a case that it ran."""
     own = chosen_contender(chosen)
     cells = [(own.formulation, own.solver)]
@@ -166,10 +195,10 @@ def _times(pool: Any, tries: Tries, chosen: Standing, clock: Clock) -> list[Tria
         cells += [(own.formulation, parse_selector(text)) for text in OTHER_SOLVERS]
     scenario, seed = tries.cases[0]
     arguments = (scenario, seed, cells, COMPARED, TIMED_PROBLEMS, TIMED_ROUNDS)
-    limit = max(clock.left_until(PARTS[2]), 5.0)
+    limit = LONGEST_TIMES * TIMES_S
     try:
         rows: list[TrialRow] = pool.schedule(time_scenario, args=arguments, timeout=limit).result()
-    except (NoTimeLeft, Exception):  # a law may end its process: no times
+    except Exception:  # a law may end its process, or take too long: no times
         return []
     return rows
 
@@ -179,16 +208,16 @@ def _search(
     cases: Cases,
     chosen: Standing,
     evaluate: Evaluate,
-    clock: Clock,
+    left: Callable[[], float],
     seed: int,
 ) -> tuple[Search | None, str]:
     """Search the near misses of the arm, or else its paths at a chosen speed, for the worst."""
     box = next((name for name in ("near-miss", "speed-sweep") if name not in cases.left_out), None)
     if box is None:
         return None, "neither near misses nor paths at a chosen speed can be made of this arm"
-    number = int(clock.left_until(PARTS[3]) / max(advice.tries.seconds_per_trial, 1e-3))
+    number = int(left() / max(advice.tries.seconds_per_trial, 1e-3))
     budget = min(max(number, FEWEST_SEARCHED), MOST_SEARCHED)
-    limited = while_time_is_left(evaluate, lambda: clock.left_until(PARTS[3]))
+    limited = while_time_is_left(evaluate, left)
     try:
         found = search_worst(
             searched(cases.given[box]),
@@ -205,7 +234,7 @@ def _search(
 
 
 def _phase(
-    cases: Cases, chosen: Standing, evaluate: Evaluate, clock: Clock
+    cases: Cases, chosen: Standing, evaluate: Evaluate, left: Callable[[], float]
 ) -> tuple[pd.DataFrame | None, str]:
     """Run the grid of near misses of the arm."""
     if "near-miss" in cases.left_out:
@@ -224,7 +253,7 @@ def _phase(
         for miss, speed in product(MISSES, SPEEDS)
         for each in laws
     ]
-    limited = while_time_is_left(evaluate, lambda: clock.left_until(PARTS[4]))
+    limited = while_time_is_left(evaluate, left)
     rows = [
         row for number in range(0, len(trials), 4) for row in limited(trials[number : number + 4])
     ]

@@ -49,6 +49,7 @@ class Answer:
         need: the need.
         first: what is recommended; None where nothing can be.
         tied: what cannot be told apart from it.
+        left_behind: what ran fewer cases, and on these could not be told apart from it either.
         others: the rest, the best first.
         cases: number of cases.
         reason: why nothing is recommended; else empty.
@@ -57,6 +58,7 @@ class Answer:
     need: Need
     first: Standing | None
     tied: tuple[Standing, ...]
+    left_behind: tuple[Standing, ...]
     others: tuple[Standing, ...]
     cases: int
     reason: str = ""
@@ -91,7 +93,7 @@ def answer(need: Need, trials: pd.DataFrame) -> Answer:
             f"{number} cases that something can do are too few to say (at least "
             f"{FEWEST_SCENARIOS}); valid: a larger --budget"
         )
-        return Answer(need, None, (), (), number, reason)
+        return Answer(need, None, (), (), (), number, reason)
     may = dependable(part, whole)
     found = rates(part, need.met(part), may)
     standings = _standings(part, need, found)
@@ -104,14 +106,16 @@ def answer(need: Need, trials: pd.DataFrame) -> Answer:
             else "nothing that was tried met it once"
         )
         order = sorted(standings.values(), key=lambda each: -each.rate)
-        return Answer(need, None, (), tuple(order), len(found.layout.cases), reason)
-    rest = [each for pair, each in standings.items() if pair != first and pair not in tied]
+        return Answer(need, None, (), (), tuple(order), len(found.layout.cases), reason)
+    behind = _left_behind(part, whole, found)
+    rest = [e for pair, e in standings.items() if pair not in {first, *tied, *behind}]
     # Those that may be recommended come first: a straw law is nobody's runner-up.
     order = sorted(rest, key=lambda each: (_pair(each) not in may, -each.rate, each.distance))
     return Answer(
         need,
         standings[first],
         tuple(standings[pair] for pair in tied),
+        tuple(standings[pair] for pair in behind),
         tuple(order),
         len(found.layout.cases),
     )
@@ -141,6 +145,24 @@ def _first(
         if pair != first and pair in may and upper >= 0
     ]
     return first, sorted(tied, key=order)
+
+
+def _left_behind(part: pd.DataFrame, whole: pd.DataFrame, found: Rates) -> list[Contender]:
+    """Find who ran fewer cases, would be dependable by these, and is not told apart by them."""
+    pairs = list(found.contenders.itertuples(index=False, name=None))
+    ran = ~np.isnan(found.layout.fill(np.zeros(len(part))))
+    common = ran.all(axis=1)
+    first = part[common[found.layout.row]]
+    if found.whole.all() or first.empty:
+        return []
+    cells = set(zip(first["scenario"], first["seed"], strict=True))
+    own = [cell in cells for cell in zip(whole["scenario"], whole["seed"], strict=True)]
+    may = dependable(first, whole[own])
+    return [
+        pair
+        for pair, is_whole, upper in zip(pairs, found.whole, found.upper, strict=True)
+        if not is_whole and upper >= 0 and pair in may
+    ]
 
 
 def _standings(part: pd.DataFrame, need: Need, found: Rates) -> dict[Contender, Standing]:

@@ -24,13 +24,15 @@ FAMILIES: Final = (
     "near-miss",
     "speed-sweep",
     "joint-limit-graze",
-    "random-joint-path",
+    "random-joint-path[points=3,speed=1.0]",
     "pick-and-place",
     "joint-limit-detour",
-    "workspace-boundary",
     "step",
+    "workspace-boundary[path=out-and-back,extent=1.0]",
 )
-"""In the order in which they take turns."""
+"""In the order in which they take turns. Random joint paths are as fast as the joints, since slow
+ones take as long as all others together, and paths to the boundary end there, since of those that
+lead beyond it nobody can do anything."""
 
 PATH_FAMILY: Final = "csv"
 
@@ -111,11 +113,11 @@ def cases_for(
         raise DikbenchError(
             f"--obstacles {obstacles}: they stand about a path; valid: together with --path"
         )
-    for family in FAMILIES:
-        values = dict(common)
-        if family == "near-miss" and arm.parameters["robot"] not in ROBOTS:
+    for family in map(parse_selector, FAMILIES):
+        values = {**family.parameters, **common}
+        if family.name == "near-miss" and arm.parameters["robot"] not in ROBOTS:
             values["singularity"] = "auto"
-        given[family] = Selector(family, values)
+        given[family.name] = Selector(family.name, values)
     first = SPLITS["test"].start + NUMBERS_APART * (seed % 20)
     return Cases(given, first)
 

@@ -20,20 +20,27 @@ MOST_NAMED: Final = 6
 """So many tied formulations are named, the others are counted."""
 
 
-def answer_in_words(answer: Answer, slow: bool = True) -> str:
+def answer_in_words(answer: Answer) -> str:
     """Say in a sentence or two what is recommended for a need, on what evidence."""
     first = answer.first
     if first is None:
         return f"to {answer.need}: nothing is recommended: {answer.reason}"
     text = f"to {answer.need}: {first.name}: {_failed(first)} {answer.need.failed}"
-    if slow and answer.need.setting == "path" and first.slowest == first.slowest:
-        text += f", slowest at {100 / first.slowest:.0f} % of the wanted speed on average"
+    if (
+        answer.need.kind != "limits"
+        and answer.need.setting == "path"
+        and first.slowest == first.slowest
+    ):
+        text += f", the slowest in {first.slowest:.3g} times the nominal time"
     text += f" ({several(answer.cases, 'case')})"
     if answer.tied:
         some = ", ".join(f"{each.name} ({_failed(each)})" for each in answer.tied[:MOST_NAMED])
         more = len(answer.tied) - MOST_NAMED
         text += f"; not told apart from it by this sample: {some}"
         text += f" and {more} more" if more > 0 else ""
+    if answer.left_behind:
+        some = ", ".join(f"{each.name} ({_failed(each)})" for each in answer.left_behind)
+        text += f"; left behind early, though not told apart by so few cases: {some}"
     if answer.runner_up is not None:
         up = answer.runner_up
         text += f"; {'next' if answer.tied else 'runner-up'}: {up.name} ({_failed(up)})"
@@ -59,12 +66,12 @@ def will_not_do(advice: Advice) -> list[str]:
         failed = feasible[~feasible["outcome"].isin(DONE)]
         groups = failed.groupby(["scenario_family", "outcome"], sort=False).size()
         named = [
-            f"{count} of {feasible['scenario_family'].eq(family).sum()} in {family}: {outcome} "
-            f"({OUTCOME_SENTENCES[Outcome(str(outcome))]})"
+            f"{count} of {feasible['scenario_family'].eq(family).sum()} in {family} ({outcome}: "
+            f"{OUTCOME_SENTENCES[Outcome(str(outcome))]})"
             for (family, outcome), count in groups.items()
         ]
         done = f"it did its job in {len(feasible) - len(failed)} of {several(len(feasible), 'run')}"
-        lines.append(f"{words}, {done}" + (f"; failed {'; '.join(named)}" if named else ""))
+        lines.append(f"{words}, {done}" + (f"; it failed in {'; '.join(named)}" if named else ""))
     beyond = ideal[ideal["feasible"].isin(["no", "unknown"])]
     if len(beyond):
         lines.append(
@@ -117,7 +124,7 @@ def whole(
             (
                 "The worst run that was found" + same,
                 [
-                    *worst_lines,
+                    *(line.strip() for line in worst_lines),
                     f"to run it: {shlex.join(worst.command)}",
                     "to watch it: "
                     + shlex.join(

@@ -63,9 +63,8 @@ def write_page(
 def _rows(answer: Answer) -> list[tuple[Standing, bool]]:
     """List all formulations, those first that are recommended or tied with it."""
     first = () if answer.first is None else (answer.first,)
-    return [(each, True) for each in (*first, *answer.tied)] + [
-        (each, False) for each in answer.others
-    ]
+    equal = [(each, True) for each in (*first, *answer.tied, *answer.left_behind)]
+    return equal + [(each, False) for each in answer.others]
 
 
 def _image(figure: Figure, folder: Path) -> Markup:

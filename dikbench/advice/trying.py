@@ -39,6 +39,12 @@ CANDIDATES: Final = (
 )
 """What is tried: of each idea the law that stands for it."""
 
+FIRST_PART: Final = 0.35
+"""Share of the budget in which all are tried ..."""
+
+LEAST_OF_BOTH: Final = 0.5
+"""... and the least in which cases are tried at all."""
+
 FINALISTS: Final = 6
 """So many go on to the second half of the cases."""
 
@@ -123,7 +129,7 @@ def try_all(
     needs: Sequence[Need],
     evaluate: Evaluate,
     clock: Clock,
-    until: tuple[float, float],
+    reserved: Callable[[float], float],
     progress: Callable[[str], object] = lambda _: None,
     kept: Sequence[Contender] = (),
 ) -> tuple[Tries, list[Contender]]:
@@ -138,7 +144,7 @@ def try_all(
         needs: by which it is chosen who goes on.
         evaluate: runs trials.
         clock: of the budget.
-        until: shares of the budget at which the first and the second part end.
+        reserved: by the wall-clock time of a trial [s], the time [s] that the rest will take.
         progress: is told what is done.
         kept: who goes on in any case.
 
@@ -147,11 +153,12 @@ def try_all(
     """
     tries = Tries()
     begun = monotonic()
-    _part(tries, cases, contenders, [IDEAL], evaluate, clock, until[0], progress)
+    _part(tries, cases, contenders, [IDEAL], evaluate, clock, FIRST_PART, progress)
     tries.first_part = len(tries.cases)
     tries.seconds = monotonic() - begun
     going_on = _finalists(tries, contenders, needs, kept) if tries.rows else list(contenders)
-    _part(tries, cases, going_on, [IDEAL, DISTURBED], evaluate, clock, until[1], progress)
+    until = max(1 - reserved(tries.seconds_per_trial) / clock.budget, LEAST_OF_BOTH)
+    _part(tries, cases, going_on, [IDEAL, DISTURBED], evaluate, clock, until, progress)
     tries.seconds = monotonic() - begun
     return tries, going_on
 
@@ -167,10 +174,8 @@ def _part(
     progress: Callable[[str], object],
 ) -> None:
     """Run cases until a share of the budget is spent; one at least."""
-    longest = 0.0
-    ran = 0
-    while ran == 0 or clock.left_until(until) > longest:
-        begun = monotonic()
+    first, ran = monotonic(), 0
+    while ran == 0 or clock.left_until(until) > (monotonic() - first) / ran:
         cell = next(cases, None)
         if cell is None:
             return
@@ -185,7 +190,6 @@ def _part(
         tries.rows += rows
         tries.cases.append(cell)
         ran += 1
-        longest = max(longest, monotonic() - begun)
         progress(f"{len(tries.rows)} trials of {len(tries.cases)} cases")
 
 
