@@ -176,7 +176,8 @@ def _standings(part: pd.DataFrame, need: Need, found: Rates) -> dict[Contender, 
         slow = part["slow_down"].to_numpy(dtype=float)[own & met]
         slow = slow[np.isfinite(slow)]
         standings[pair] = Standing(
-            *pair,
+            formulation=pair[0],
+            solver=pair[1],
             rate=float(found.rate[number]),
             failed=int((own & ~met).sum()),
             runs=int(own.sum()),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections import Counter
 from collections.abc import Sequence
 from typing import Final
 
@@ -64,11 +65,11 @@ def will_not_do(advice: Advice) -> list[str]:
         rows = ideal[ideal["reference"].eq(setting) & ideal["outcome"].notna()]
         feasible = rows[rows["feasible"].isin(["time", "path"])]
         failed = feasible[~feasible["outcome"].isin(DONE)]
-        groups = failed.groupby(["scenario_family", "outcome"], sort=False).size()
+        pairs = Counter(zip(failed["scenario_family"], failed["outcome"], strict=True))
         named = [
             f"{count} of {feasible['scenario_family'].eq(family).sum()} in {family} ({outcome}: "
-            f"{OUTCOME_SENTENCES[Outcome(str(outcome))]})"
-            for (family, outcome), count in groups.items()
+            f"{OUTCOME_SENTENCES[Outcome(outcome)]})"
+            for (family, outcome), count in pairs.items()
         ]
         done = f"it did its job in {len(feasible) - len(failed)} of {several(len(feasible), 'run')}"
         lines.append(f"{words}, {done}" + (f"; it failed in {'; '.join(named)}" if named else ""))
@@ -80,10 +81,10 @@ def will_not_do(advice: Advice) -> list[str]:
         )
     disturbed = own[own["plant"].eq(str(DISTURBED)) & own["feasible"].isin(["time", "path"])]
     if len(disturbed):
-        done = int(disturbed["outcome"].isin(DONE).sum())
+        well = int(disturbed["outcome"].isin(DONE).sum())
         lines.append(
             f"by the clock, with noise of 1e-4 rad on the measured joints and commands 2 steps "
-            f"late, it did its job in {done} of {several(len(disturbed), 'run')}"
+            f"late, it did its job in {well} of {several(len(disturbed), 'run')}"
         )
     return lines
 

@@ -17,6 +17,7 @@ from dikbench.plugins.tuned import file_for, key_of, read_tuned
 from dikbench.results.selected import with_selected
 from dikbench.run.trial_row import TrialRow
 from dikbench.selector import Selector, parse_selector
+from dikbench.statistics.first_places import FEWEST_SCENARIOS
 from dikbench.statistics.success import counted, rates, with_facts
 from dikbench.study.trial import Trial
 
@@ -44,6 +45,10 @@ FIRST_PART: Final = 0.35
 
 LEAST_OF_BOTH: Final = 0.5
 """... and the least in which cases are tried at all."""
+
+FEWEST_CASES: Final = FEWEST_SCENARIOS + 3
+LATEST: Final = 0.75
+"""Until this share of the budget cases are tried where there are fewer."""
 
 FINALISTS: Final = 6
 """So many go on to the second half of the cases."""
@@ -175,7 +180,7 @@ def _part(
 ) -> None:
     """Run cases until a share of the budget is spent; one at least."""
     first, ran = monotonic(), 0
-    while ran == 0 or clock.left_until(until) > (monotonic() - first) / ran:
+    while ran == 0 or _goes_on(tries, clock, until, (monotonic() - first) / ran):
         cell = next(cases, None)
         if cell is None:
             return
@@ -191,6 +196,16 @@ def _part(
         tries.cases.append(cell)
         ran += 1
         progress(f"{len(tries.rows)} trials of {len(tries.cases)} cases")
+
+
+def _goes_on(tries: Tries, clock: Clock, until: float, each: float) -> bool:
+    """Say whether another case is begun, of which each takes so long [s].
+
+    Of too few cases nothing can be said, and all that is done afterwards waits for these.
+    """
+    if len(tries.cases) < FEWEST_CASES:
+        until = max(until, LATEST)
+    return clock.left_until(until) > each
 
 
 def _finalists(

@@ -18,7 +18,7 @@ def last_moved_link(path: str) -> str | None:
     for joint in root.iter("joint"):
         child, parent = joint.find("child"), joint.find("parent")
         if child is not None and parent is not None:
-            moves = joint.get("type") != "fixed"
+            moves = joint.get("type") != "fixed" and joint.find("mimic") is None
             above[child.get("link", "")] = (parent.get("link", ""), moves)
     best, most = None, 0
     for link in above:
