@@ -132,7 +132,7 @@ def advise(
             return page + TIMES_S + trial * (SEARCHED + 2 * len(MISSES) * len(SPEEDS))
 
         tries, went_on = try_all(
-            iter(cases), contenders, needs, evaluate, clock, reserved, progress, added
+            cases, contenders, needs, evaluate, clock, reserved, progress, added
         )
         if not tries.rows:
             reasons = "; ".join(f"{family}: {why}" for family, why in cases.left_out.items())

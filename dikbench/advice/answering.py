@@ -151,7 +151,7 @@ def _left_behind(part: pd.DataFrame, whole: pd.DataFrame, found: Rates) -> list[
     """Find who ran fewer cases, would be dependable by these, and is not told apart by them."""
     pairs = list(found.contenders.itertuples(index=False, name=None))
     ran = ~np.isnan(found.layout.fill(np.zeros(len(part))))
-    common = ran.all(axis=1)
+    common = np.asarray(ran.all(axis=1))
     first = part[common[found.layout.row]]
     if found.whole.all() or first.empty:
         return []

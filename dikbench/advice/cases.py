@@ -39,6 +39,9 @@ PATH_FAMILY: Final = "csv"
 FASTER: Final = (1.0, 1.5, 2.5)
 """The given path is run as it is, and so many times as fast."""
 
+MOST_ATTEMPTS: Final = 8
+"""A family of which so many draws in a row are rejected is left out."""
+
 NUMBERS_APART: Final = 40
 """Instances of advice with another seed begin so many numbers later."""
 
@@ -70,12 +73,20 @@ class Cases:
                 except DikbenchError as error:
                     self.left_out[family] = str(error)
 
+    def leave_out(self, cell: Cell, why: str) -> None:
+        """Leave out from now on the family that gave a case."""
+        scenario = cell[0]
+        for family, selector in self.given.items():
+            same = selector.parameters.get("file") == scenario.parameters.get("file")
+            if selector.name == scenario.name and same:
+                self.left_out[family] = why
+
     def _case(self, family: str, selector: Selector, number: int) -> Cell:
         """Draw a case of a family; of the given path the number is the seed."""
         if family.startswith(PATH_FAMILY):
             make_scenario(selector, number)
             return selector, number
-        last = draw(selector, [number])[-1]
+        last = draw(selector, [number], most=MOST_ATTEMPTS)[-1]
         return parse_selector(last.scenario), last.seed
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from time import monotonic
 from typing import Any, Final
 
 import pandas as pd
 
+from dikbench.advice.cases import Cases
 from dikbench.advice.contender import Contender, contender
 from dikbench.advice.evaluating import Evaluate
 from dikbench.advice.needs import Need
@@ -46,9 +47,18 @@ FIRST_PART: Final = 0.35
 LEAST_OF_BOTH: Final = 0.5
 """... and the least in which cases are tried at all."""
 
+LONGEST_CASE: Final = 0.1
+"""A family of which a case takes more than this share of the budget ..."""
+
+SLOWER: Final = 2.0
+"""... and so many times what cases took before has no other one."""
+
+TRIALS_AT_ONCE: Final = 8
+"""So many are begun before it is seen whether time is left."""
+
 FEWEST_CASES: Final = FEWEST_SCENARIOS + 3
-LATEST: Final = 0.75
-"""Until this share of the budget cases are tried where there are fewer."""
+LATEST: Final = 0.85
+"""Until this share of the budget cases are tried where there are fewer, and none at all later."""
 
 FINALISTS: Final = 6
 """So many go on to the second half of the cases."""
@@ -129,7 +139,7 @@ def _tuned(selector: Selector) -> Selector:
 
 
 def try_all(
-    cases: Iterator[Cell],
+    cases: Cases,
     contenders: Sequence[Contender],
     needs: Sequence[Need],
     evaluate: Evaluate,
@@ -144,7 +154,8 @@ def try_all(
     and every formulation runs all of it, so that rates compare like with like.
 
     Args:
-        cases: the cases; fewer are run where they come to an end.
+        cases: the cases; fewer are run where they come to an end. A family that takes too long is
+            left out.
         contenders: what is tried.
         needs: by which it is chosen who goes on.
         evaluate: runs trials.
@@ -156,46 +167,60 @@ def try_all(
     Returns:
         What was tried, and who went on.
     """
-    tries = Tries()
+    tries, every = Tries(), iter(cases)
     begun = monotonic()
-    _part(tries, cases, contenders, [IDEAL], evaluate, clock, FIRST_PART, progress)
+
+    def part(those: Sequence[Contender], plants: Sequence[Selector], until: float) -> None:
+        """Run cases until a share of the budget is spent; one at least."""
+        first, ran = monotonic(), 0
+        while ran == 0 or _goes_on(tries, clock, until, (monotonic() - first) / ran):
+            start = monotonic()
+            cell = next(every, None)
+            if cell is None:
+                return
+            rows = _rows(cell, those, plants, evaluate, clock)
+            if not rows:
+                return
+            tries.rows += rows
+            tries.cases.append(cell)
+            ran += 1
+            took = monotonic() - start
+            others = (start - begun) / max(len(tries.cases) - 1, 1)
+            if took > max(LONGEST_CASE * clock.budget, SLOWER * others):
+                cases.leave_out(cell, f"after a case that took {took:.0f} s of the budget")
+            progress(f"{len(tries.rows)} trials of {len(tries.cases)} cases")
+
+    part(contenders, [IDEAL], FIRST_PART)
     tries.first_part = len(tries.cases)
     tries.seconds = monotonic() - begun
     going_on = _finalists(tries, contenders, needs, kept) if tries.rows else list(contenders)
     until = max(1 - reserved(tries.seconds_per_trial) / clock.budget, LEAST_OF_BOTH)
-    _part(tries, cases, going_on, [IDEAL, DISTURBED], evaluate, clock, until, progress)
+    part(going_on, [IDEAL, DISTURBED], until)
     tries.seconds = monotonic() - begun
     return tries, going_on
 
 
-def _part(
-    tries: Tries,
-    cases: Iterator[Cell],
+def _rows(
+    cell: Cell,
     contenders: Sequence[Contender],
     plants: Sequence[Selector],
     evaluate: Evaluate,
     clock: Clock,
-    until: float,
-    progress: Callable[[str], object],
-) -> None:
-    """Run cases until a share of the budget is spent; one at least."""
-    first, ran = monotonic(), 0
-    while ran == 0 or _goes_on(tries, clock, until, (monotonic() - first) / ran):
-        cell = next(cases, None)
-        if cell is None:
-            return
-        scenario, seed = cell
-        trials = [
-            Trial(each.formulation, scenario, each.solver, plant, reference, seed)
-            for each in contenders
-            for plant in plants
-            for reference in (REFERENCES if plant is IDEAL else ("time",))
-        ]
-        rows = evaluate(trials)
-        tries.rows += rows
-        tries.cases.append(cell)
-        ran += 1
-        progress(f"{len(tries.rows)} trials of {len(tries.cases)} cases")
+) -> list[TrialRow]:
+    """Run a case; nothing is kept of it where time runs out meanwhile."""
+    scenario, seed = cell
+    trials = [
+        Trial(each.formulation, scenario, each.solver, plant, reference, seed)
+        for each in contenders
+        for plant in plants
+        for reference in (REFERENCES if plant is IDEAL else ("time",))
+    ]
+    rows: list[TrialRow] = []
+    for number in range(0, len(trials), TRIALS_AT_ONCE):
+        if clock.left_until(LATEST) < 0:
+            return []
+        rows += evaluate(trials[number : number + TRIALS_AT_ONCE])
+    return rows
 
 
 def _goes_on(tries: Tries, clock: Clock, until: float, each: float) -> bool:

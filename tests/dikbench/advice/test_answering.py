@@ -27,7 +27,7 @@ STANDS: dict[str, Any] = {
 
 def rows(laws: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
     """Make rows of both references."""
-    parts = [make_rows(laws, scenarios=CASES, reference=each) for each in ("path", "time")]
+    parts = [make_rows({**laws}, scenarios=CASES, reference=each) for each in ("path", "time")]
     return pd.concat(parts, ignore_index=True)
 
 

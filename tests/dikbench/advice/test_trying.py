@@ -9,6 +9,7 @@ import pytest
 from makers.rows import FAULTLESS
 
 from dikbench.advice import trying
+from dikbench.advice.cases import Cases
 from dikbench.advice.contender import contender
 from dikbench.advice.needs import Need
 from dikbench.advice.trying import FEWEST_CASES, Clock, Tries, candidates, try_all
@@ -30,23 +31,31 @@ class Time:
         return self.now
 
 
-def cells() -> Iterator[Cell]:
-    """Yield cases for ever."""
-    number = 0
-    while True:
-        number += 1
-        yield Selector("near-miss", {"robot": "ur5", "speed": f"0.{number}"}), number
+class Endless(Cases):
+    """Cases for ever, of two families in turn."""
+
+    def __iter__(self) -> Iterator[Cell]:
+        """Yield them."""
+        for number in range(10_000):
+            name = ("near-miss", "step")[number % 2]
+            if name not in self.left_out:
+                yield Selector(name, {"robot": "ur5", "speed": f"0.{number}"}), number
 
 
 def tried(
-    monkeypatch: pytest.MonkeyPatch, budget: float, seconds: float, reserved: float = 0.0
+    monkeypatch: pytest.MonkeyPatch,
+    budget: float,
+    seconds: float,
+    reserved: float = 0.0,
+    slow_family: str = "",
 ) -> tuple[Tries, list[Any], float]:
     """Try where each trial takes so long, and laws fail but for `qp` and `sns`."""
     time = Time()
     monkeypatch.setattr(trying, "monotonic", time)
 
     def evaluate(trials: Sequence[Trial]) -> list[dict[str, Any]]:
-        time.now += seconds * len(trials)
+        slow = 40 if trials[0].scenario.name == slow_family else 1
+        time.now += slow * seconds * len(trials)
         return [
             {
                 **FAULTLESS,
@@ -57,8 +66,10 @@ def tried(
             for trial in trials
         ]
 
+    families = ("near-miss", "step")
+    cases = Endless({name: Selector(name) for name in families}, 100)
     found, went_on = try_all(
-        cells(), candidates(), NEEDS, evaluate, Clock(budget, 0.0), lambda trial: reserved
+        cases, candidates(), NEEDS, evaluate, Clock(budget, 0.0), lambda trial: reserved
     )
     return found, went_on, time.now
 
@@ -78,6 +89,15 @@ def test_a_slow_machine_takes_from_the_rest_first(monkeypatch: pytest.MonkeyPatc
     found, _, spent = tried(monkeypatch, 60, 0.3, reserved=50)
     assert 30 < spent <= 60
     assert len(found.cases) < FEWEST_CASES
+
+
+def test_a_family_that_takes_too_long_has_one_case(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The others have the rest of the time."""
+    found, _, spent = tried(monkeypatch, 180, 0.03, 40, slow_family="step")
+    names = [scenario.name for scenario, _ in found.cases]
+    assert names.count("step") == 1
+    assert names.count("near-miss") > 10
+    assert spent <= 180
 
 
 def test_whoever_does_best_goes_on_and_runs_every_case(monkeypatch: pytest.MonkeyPatch) -> None:
