@@ -27,7 +27,8 @@ STANDS: dict[str, Any] = {
 
 def rows(laws: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
     """Make rows of both references."""
-    parts = [make_rows({**laws}, scenarios=CASES, reference=each) for each in ("path", "time")]
+    named: dict[str | tuple[str, str], Mapping[str, Any]] = {name: laws[name] for name in laws}
+    parts = [make_rows(named, scenarios=CASES, reference=each) for each in ("path", "time")]
     return pd.concat(parts, ignore_index=True)
 
 
