@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from pathlib import Path
 from typing import Any, Final
 
 import pandas as pd
@@ -20,8 +19,6 @@ from dikbench.advice.searched import searched
 from dikbench.advice.trying import CANDIDATES, IDEAL, Clock, Tries, try_all
 from dikbench.advice.worst import Search, search_worst
 from dikbench.errors import DikbenchError
-from dikbench.report.drawing.figure import Figure
-from dikbench.report.figures.phase_diagram import draw_phase_diagrams
 from dikbench.results.selected import with_selected
 from dikbench.run.in_workers import WORK, RunSettings
 from dikbench.run.pool import available_cores, workers
@@ -262,11 +259,3 @@ def _phase(
         return None, str(rows[0]["message"])
     found: pd.DataFrame = with_facts(with_selected(pd.DataFrame(rows)))
     return found, ""
-
-
-def phase_figures(advice: Advice, folder: Path) -> list[Figure]:
-    """Draw the phase diagrams of an arm."""
-    if advice.phase is None:
-        return []
-    ran = advice.phase[advice.phase["steps"].gt(0)]
-    return draw_phase_diagrams(ran, folder)

@@ -7,10 +7,12 @@ from typing import Final
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 
 from dikbench.advice.arm import Arm
 from dikbench.report.drawing.figure import Figure
 from dikbench.report.drawing.style import COLOURS, lay_out, save, style
+from dikbench.report.figures.phase_diagram import draw_phase_diagrams
 from dikbench.robots.stick_figure import stick
 from dikbench.scenario.scenario import Scenario
 
@@ -85,3 +87,11 @@ def draw_path(scenario: Scenario, folder: Path) -> Figure | None:
         "(orange: the limits).",
         "The path: singularities, limits, speeds",
     )
+
+
+def draw_phases(trials: pd.DataFrame | None, folder: Path) -> list[Figure]:
+    """Draw the phase diagrams of trials of a grid; none where there are none."""
+    if trials is None:
+        return []
+    with style():
+        return draw_phase_diagrams(trials[trials["steps"].gt(0)], folder)

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pandas as pd
 
-from dikbench.advice.advising import Advice, phase_figures
+from dikbench.advice.advising import Advice
 from dikbench.advice.control_loop import control_loop
 from dikbench.advice.in_words import whole
 from dikbench.advice.page import write_page
-from dikbench.advice.pictures import draw_arm, draw_path
+from dikbench.advice.pictures import draw_arm, draw_path, draw_phases
 from dikbench.advice.trying import plain
 from dikbench.advice.worst_case import in_words, keep_worst
 from dikbench.errors import DikbenchError
@@ -60,7 +60,7 @@ def present(
         f"Advice for {advice.arm.robot.name}, frame {advice.arm.robot.frame}, dt {advice.dt:g} s"
     )
     write_page(
-        page, title, chapters, advice.answers, of_arm, phase_figures(advice, figures), figures,
+        page, title, chapters, advice.answers, of_arm, draw_phases(advice.phase, figures), figures,
         program,
     )  # fmt: skip
     return chapters, program

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import html
 import re
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from makers.rows import FAULTLESS
+from makers.rows import FAULTLESS, make_rows
 
 from dikbench.advice.advising import Advice, chosen_contender
-from dikbench.advice.answering import answers
+from dikbench.advice.answering import Standing, answers
 from dikbench.advice.arm import look_at
 from dikbench.advice.contender import contender
 from dikbench.advice.needs import Need
+from dikbench.advice.pictures import draw_phases
 from dikbench.advice.presenting import present
 from dikbench.advice.trying import DISTURBED, Tries
 from dikbench.run.in_workers import RunSettings
@@ -55,10 +57,7 @@ def made_up(folder: Path) -> tuple[list[tuple[str, list[str]]], str, str]:
 def test_the_page_says_what_the_terminal_says(tmp_path: Path) -> None:
     """Every line of it, in a file without network; names of plug-ins are text, not markup."""
     chapters, program, page = made_up(tmp_path)
-    text = re.sub(r"<[^>]*>", "", page)
-    import html
-
-    text = html.unescape(text)
+    text = html.unescape(re.sub(r"<[^>]*>", "", page))
     for heading, lines in chapters:
         for line in [heading, *lines]:
             assert line.replace("`", "") in text
@@ -85,8 +84,17 @@ def test_the_sentences_have_the_numbers_of_the_rows(tmp_path: Path) -> None:
 
 def test_what_is_chosen_is_a_contender() -> None:
     """Its texts are selectors again."""
-    from dikbench.advice.answering import Standing
-
     law = contender("dls[damping=0.1]")
     standing = Standing(str(law.formulation), str(law.solver), 1.0, 0, 8, 0.1, 1.0)
     assert chosen_contender(standing) == law
+
+
+def test_a_grid_of_near_misses_is_drawn(tmp_path: Path) -> None:
+    """With a panel for each of two laws, in the style of all figures; nothing where none ran."""
+    names = [f"near-miss[robot=ur5,miss={m},speed={s}]" for m in (0.01, 0.05) for s in (0.1, 1.0)]
+    trials = make_rows({"dls": {}, "qp": {"outcome": "left-path"}}, names, reference="path")
+    figures = draw_phases(trials, tmp_path)
+    assert any("outcome" in each.file for each in figures)
+    for each in figures:
+        assert (tmp_path / each.file).stat().st_size > 1000
+    assert draw_phases(None, tmp_path) == []
