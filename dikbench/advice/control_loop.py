@@ -8,7 +8,7 @@ LOOP = """import dikbench
 import numpy as np
 import pinocchio as pin
 
-robot = dikbench.load_robot({robot}){acceleration}
+robot = dikbench.load_robot({robot})
 q, v, dt = robot.q0, np.zeros(robot.nv), {dt}  # of your robot: q and v as measured
 data = robot.model.createData()
 pin.framesForwardKinematics(robot.model, data, q)
@@ -32,13 +32,8 @@ def control_loop(parameters: Mapping[str, str], dt: float, formulation: str, sol
     """
     name, *others = parameters.items()
     options = [repr(name[1]), *(f"{key}={value!r}" for key, value in others)]
-    options = [each for each in options if not each.startswith("acceleration='true'")]
-    known = parameters.get("acceleration") == "true"
     return LOOP.format(
         robot=", ".join(options),
-        acceleration="\nrobot = robot.with_limits(acceleration=robot.available_acceleration)"
-        if known
-        else "",
         dt=repr(dt),
         formulation=repr(formulation),
         solver="" if solver == "none" else f", solver={solver!r}",
