@@ -71,7 +71,7 @@ class Cases:
                 try:
                     yield self._case(family, selector, number)
                 except DikbenchError as error:
-                    self.left_out[family] = str(error)
+                    self.left_out[family] = _in_short(str(error), selector)
 
     def leave_out(self, cell: Cell, why: str) -> None:
         """Leave out from now on the family that gave a case."""
@@ -88,6 +88,16 @@ class Cases:
             return selector, number
         last = draw(selector, [number], most=MOST_ATTEMPTS)[-1]
         return parse_selector(last.scenario), last.seed
+
+
+def _in_short(reason: str, selector: Selector) -> str:
+    """Shorten why a family has no case: the last attempt's reason, a file without its folder."""
+    reason = reason.rpartition("the last one: ")[2]
+    if reason.startswith("scenario ") and "]: " in reason:
+        reason = reason.partition("]: ")[2]
+    reason = reason.removeprefix(f"scenario {selector.name}: ")
+    robot = selector.parameters["robot"]
+    return reason.replace(robot, Path(robot).name)
 
 
 def cases_for(
