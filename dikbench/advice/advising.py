@@ -29,8 +29,14 @@ from dikbench.statistics.success import with_facts
 from dikbench.study.trial import NO_SOLVER, Trial
 
 SHORTEST_PAGE_S: Final = 6.0
-"""Time that figures, the page and the worst run take at least; where the machine is busy, as long
-as the start of the workers with the first case."""
+"""Time that figures, the page and the worst run take at least ..."""
+
+STARTS_A_PAGE: Final = 3.0
+"""... and so many times that of the first start of the workers, which tells how busy the machine
+is ..."""
+
+MOST_OF_PAGE: Final = 0.25
+"""... but for more than this share of the budget nothing else waits."""
 
 TIMES_S: Final = 4.0
 """Time that the timing pass takes ..."""
@@ -122,7 +128,8 @@ def advise(
     added = [each for each in contenders if each.formulation.name not in _shipped()]
     with workers(settings.jobs, WORK, settings.trial_memory) as pool:
         evaluate = evaluator(pool, limit)
-        page = max(SHORTEST_PAGE_S, _start(pool, clock))
+        page = max(SHORTEST_PAGE_S, STARTS_A_PAGE * _start(pool, clock))
+        page = min(page, MOST_OF_PAGE * clock.budget)
 
         def reserved(trial: float) -> float:
             """Return how long all else takes [s], by the time of a trial."""

@@ -57,7 +57,7 @@ TRIALS_AT_ONCE: Final = 8
 """So many are begun before it is seen whether time is left."""
 
 FEWEST_CASES: Final = FEWEST_SCENARIOS + 3
-LATEST: Final = 0.85
+LATEST: Final = 0.75
 """Until this share of the budget cases are tried where there are fewer, and none at all later."""
 
 FINALISTS: Final = 6

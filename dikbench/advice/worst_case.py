@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pandas as pd
 
 from dikbench.advice.worst import Search, Tried
@@ -55,7 +56,8 @@ def keep_worst(search: Search, solver: str, out: Path | None, settings: RunSetti
     case = search.worst
     study, command = _study(search, case, solver, out)
     folder = Path("runs") / folder_of(study) if out is None else out
-    made = run_study(study, folder, replace(settings, traces="all"), shlex.join(command))
+    untimed = msgspec.structs.replace(study, timing=None)
+    made = run_study(untimed, folder, replace(settings, traces="all"), shlex.join(command))
     with made.open_store() as store:
         stored = {str(row["formulation"]): row for _, row in store.planned().iterrows()}
     rows = [stored[str(each.formulation)] for each in search.contenders]
