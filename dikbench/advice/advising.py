@@ -139,8 +139,7 @@ def advise(
             cases, contenders, needs, evaluate, clock, reserved, progress, added
         )
         if not tries.rows:
-            reasons = "; ".join(f"{family}: {why}" for family, why in cases.left_out.items())
-            raise DikbenchError(f"robot {arm.robot.name}: no case can be made of it: {reasons}")
+            raise DikbenchError(_no_case(arm, cases, clock))
         found = answers(needs, on_ideal_plant(tries.trials))
         chosen = next((each.first for each in found if each.first is not None), None)
         advice = Advice(arm, dt, found, tries, went_on, cases.left_out, chosen)
@@ -169,6 +168,20 @@ def advise(
             phase=phase,
             no_phase=no_phase,
         )
+
+
+def _no_case(arm: Arm, cases: Cases, clock: Clock) -> str:
+    """Say why no case was run."""
+    if len(cases.left_out) < len(cases.given):
+        return (
+            f"robot {arm.robot.name}: in {clock.budget:g} s not one case was run with everything "
+            "that is tried; valid: a larger --budget"
+        )
+    family, why = next(iter(cases.left_out.items()))
+    return (
+        f"robot {arm.robot.name}: no case of {len(cases.given)} families can be made of it; "
+        f"{family}: {why}"
+    )
 
 
 def _shipped() -> set[str]:

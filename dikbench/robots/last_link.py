@@ -6,7 +6,9 @@ from xml.etree import ElementTree
 
 
 def last_moved_link(path: str) -> str | None:
-    """Find the link of a URDF that most joints move, the last of them; None where there is none.
+    """Find the link of a URDF that most joints move; None where there is none.
+
+    Of several it is the one at the end of the longest chain of links, and the last one of these.
 
     Whatever else is wrong with a file is told where the robot is loaded.
     """
@@ -20,13 +22,13 @@ def last_moved_link(path: str) -> str | None:
         if child is not None and parent is not None:
             moves = joint.get("type") != "fixed" and joint.find("mimic") is None
             above[child.get("link", "")] = (parent.get("link", ""), moves)
-    best, most = None, 0
+    best, most = None, (1, 0)
     for link in above:
         count, at, seen = 0, link, set[str]()
         while at in above and at not in seen:
             seen.add(at)
             at, moves = above[at]
             count += moves
-        if count >= max(most, 1):
-            best, most = link, count
+        if (count, len(seen)) >= most:
+            best, most = link, (count, len(seen))
     return best
