@@ -91,7 +91,7 @@ def answer(need: Need, trials: pd.DataFrame) -> Answer:
         number = 0 if part.empty else part["scenario"].nunique()
         reason = (
             f"{number} cases that something can do are too few to say (at least "
-            f"{FEWEST_SCENARIOS}); valid: a larger --budget"
+            f"{FEWEST_SCENARIOS}); valid: a larger --budget, or a frame that more families fit"
         )
         return Answer(need, None, (), (), (), number, reason)
     may = dependable(part, whole)

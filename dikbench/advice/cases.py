@@ -34,6 +34,12 @@ FAMILIES: Final = (
 ones take as long as all others together, and paths to the boundary end there, since of those that
 lead beyond it nobody can do anything."""
 
+SPARE: Final = ("reach", "back-and-forth")
+"""What is run in addition on an arm that hardly any of them fits, such as one with thirteen joints."""
+
+FEWEST_FAMILIES: Final = 3
+"""Fewer families than that are hardly any."""
+
 PATH_FAMILY: Final = "csv"
 
 FASTER: Final = (1.0, 1.5, 2.5)
@@ -52,20 +58,25 @@ class Cases:
 
     Attributes:
         given: what each family is given.
+        number: of the first instances.
+        spare: families that are added where fewer than `FEWEST_FAMILIES` are left.
         left_out: why families have no case, by family.
     """
 
-    given: Mapping[str, Selector]
+    given: dict[str, Selector]
     number: int
+    spare: Mapping[str, Selector] = field(default_factory=dict)
     left_out: dict[str, str] = field(default_factory=dict)
 
     def __iter__(self) -> Iterator[Cell]:
         """Yield cases, the families in turn; one whose drawing fails is left out from then on."""
         numbers = SPLITS["test"]
         for number in range(self.number, numbers.stop):
+            if len(self.given) - len(self.left_out) < FEWEST_FAMILIES:
+                self.given.update(self.spare)
             if len(self.left_out) == len(self.given):
                 return
-            for family, selector in self.given.items():
+            for family, selector in list(self.given.items()):
                 if family in self.left_out:
                     continue
                 try:
@@ -140,7 +151,7 @@ def cases_for(
             values["singularity"] = "auto"
         given[family.name] = Selector(family.name, values)
     first = SPLITS["test"].start + NUMBERS_APART * (seed % 20)
-    return Cases(given, first)
+    return Cases(given, first, {name: Selector(name, common) for name in SPARE})
 
 
 def faster_paths(path: Path, folder: Path) -> Mapping[float, Path]:

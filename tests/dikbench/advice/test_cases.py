@@ -69,3 +69,12 @@ def test_a_path_out_of_reach_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(DikbenchError, match="reach") as caught:
         cases_for(look_at("ur5"), 0.02, 0, file, None, tmp_path / "out")
     assert "\n" not in str(caught.value)
+
+
+def test_an_arm_that_hardly_any_family_fits_has_spare_ones(tmp_path: Path) -> None:
+    """All others are left out: it reaches and sweeps, for as many cases as there is time."""
+    cases = cases_for(look_at("ur5"), 0.02, 0, None, None, tmp_path)
+    for family in list(cases.given):
+        cases.left_out[family] = "does not fit"
+    names = [scenario.name for scenario, _ in islice(cases, 4)]
+    assert names == ["reach", "back-and-forth", "reach", "back-and-forth"]
