@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from dikbench.cli.advice_command import advise
 from dikbench.cli.checking import check
 from dikbench.cli.merging_command import merge
 from dikbench.cli.new_command import new
@@ -18,6 +19,7 @@ from dikbench.cli.reading_commands import compare, replay, table
 from dikbench.cli.reproducing_command import reproduce
 from dikbench.cli.study_options import JOBS_OPTION, METRIC_OPTION, study_options
 from dikbench.cli.tuning_command import tune
+from dikbench.cli.worst_command import worst
 
 EXIT_CODE_OF_STANDSTILL = 3
 """Exit code of a run in which no trial of a formulation took a step."""
@@ -322,6 +324,7 @@ def show(name: str, figure: Path | None, instance: int | None) -> None:
     click.echo(text)
 
 
+commands.add_command(advise)
 commands.add_command(check)
 commands.add_command(compare)
 commands.add_command(merge)
@@ -330,3 +333,4 @@ commands.add_command(replay)
 commands.add_command(reproduce)
 commands.add_command(table)
 commands.add_command(tune)
+commands.add_command(worst)

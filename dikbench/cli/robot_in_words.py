@@ -5,12 +5,12 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Mapping
 from typing import Any, Final
-from xml.etree import ElementTree
 
 import numpy as np
 
 from dikbench.arrays import Array
 from dikbench.errors import unknown
+from dikbench.robots.last_link import last_moved_link
 from dikbench.robots.limits import Interval
 from dikbench.robots.loading import load_robot
 from dikbench.robots.plugged import EVERY_ROBOT, robot_entry
@@ -50,7 +50,7 @@ def robot_in_words(name_or_urdf: str, options: Mapping[str, str]) -> str:
             head.append(f"  file: {found.file}")
         source = entry.acceleration_source
     else:
-        given.setdefault("frame", _last_moved_link(name_or_urdf))
+        given.setdefault("frame", last_moved_link(name_or_urdf))
         robot = load_robot(name_or_urdf, **given)
         named = f"task frame {robot.frame}"
         named = named if "frame" in options else "name its task frame with frame=..."
@@ -76,33 +76,6 @@ def robot_in_words(name_or_urdf: str, options: Mapping[str, str]) -> str:
             ),
         ]
     )
-
-
-def _last_moved_link(path: str) -> str | None:
-    """Find the link of a URDF that most joints move, the last of them; None where there is none.
-
-    Whatever else is wrong with a file is told where the robot is loaded.
-    """
-    try:
-        root = ElementTree.parse(path).getroot()
-    except (OSError, ElementTree.ParseError):
-        return None
-    above: dict[str, tuple[str, bool]] = {}
-    for joint in root.iter("joint"):
-        child, parent = joint.find("child"), joint.find("parent")
-        if child is not None and parent is not None:
-            moves = joint.get("type") != "fixed"
-            above[child.get("link", "")] = (parent.get("link", ""), moves)
-    best, most = None, 0
-    for link in above:
-        count, at, seen = 0, link, set[str]()
-        while at in above and at not in seen:
-            seen.add(at)
-            at, moves = above[at]
-            count += moves
-        if count >= max(most, 1):
-            best, most = link, count
-    return best
 
 
 def _joints(robot: Robot) -> list[str]:

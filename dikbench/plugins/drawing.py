@@ -93,11 +93,25 @@ def _drawn(parameter: Parameter, random: np.random.Generator) -> str:
     """Draw the value of a parameter, as a text that is exact."""
     bounds = parameter.drawn
     assert bounds is not None
-    if choices := ("false", "true") if parameter.type is bool else parameter.choices:
-        return str(choices[int(random.integers(len(choices)))])
+    if choices := choices_of(parameter):
+        return choices[int(random.integers(len(choices)))]
     low, high = bounds.low, bounds.high
     if is_whole(parameter) and not bounds.log:
         return str(int(random.integers(int(low), int(high), endpoint=True)))
-    value = scaled(bounds, random.uniform())
+    return number_at(parameter, random.uniform())
+
+
+def number_at(parameter: Parameter, share: float) -> str:
+    """Write the number at a share of the range of a numeric parameter, 0 to 1, as an exact text."""
+    bounds = parameter.drawn
+    assert bounds is not None
+    value = scaled(bounds, share)
     rounded = round(value) if is_whole(parameter) else float(f"{value:.{DIGITS}g}")
-    return repr(min(max(rounded, low), high))
+    return repr(min(max(rounded, bounds.low), bounds.high))
+
+
+def choices_of(parameter: Parameter) -> tuple[str, ...]:
+    """Return the values between which a parameter that is no number is drawn, as texts."""
+    if parameter.type is bool:
+        return ("false", "true")
+    return tuple(map(str, parameter.choices))

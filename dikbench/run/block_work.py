@@ -119,7 +119,7 @@ def rows_of_block(future: Future[Any], block: Block, timeout: float) -> list[Tri
         OtherWorker: if the worker lacks what was expected of it.
     """
     if len(block) == 1:
-        return [_row(future, block[0].trial, timeout)]
+        return [row_of(future, block[0].trial, timeout)]
     try:
         rows, described = future.result()
     except (CannotStore, OtherWorker):
@@ -129,7 +129,7 @@ def rows_of_block(future: Future[Any], block: Block, timeout: float) -> list[Tri
     return [{**row, "described": described} for row in rows]
 
 
-def _row(future: Future[Any], trial: Trial, timeout: float) -> TrialRow:
+def row_of(future: Future[Any], trial: Trial, timeout: float) -> TrialRow:
     """Return the row of a finished trial, however it ended."""
     try:
         made, described = future.result()

@@ -78,7 +78,7 @@ def described(commit: str | None, command: str) -> TrialRow:
 
 def work(
     trial: Trial,
-    trace: Path,
+    trace: Path | None,
     policy: TracePolicy,
     commit: str | None,
     command: str,
@@ -88,7 +88,7 @@ def work(
 
     Args:
         trial: the cell.
-        trace: file for its trace.
+        trace: file for its trace, or None.
         policy: whether the trace is kept.
         commit: see `environment`.
         command: see `environment`.

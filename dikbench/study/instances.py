@@ -108,20 +108,29 @@ def draw_instance(given: Selector, number: int) -> list[Attempt]:
 
 
 def draw(
-    given: Selector, numbers: Sequence[int], progress: Progress = lambda _: None
+    given: Selector,
+    numbers: Sequence[int],
+    progress: Progress = lambda _: None,
+    most: int = MOST_ATTEMPTS,
 ) -> list[Attempt]:
     """Draw the instances of a selector, those that are rejected again with the same robot.
+
+    Args:
+        given: what is fixed.
+        numbers: of the instances.
+        progress: is told how many more instances there are.
+        most: number of attempts at each.
 
     Returns:
         All attempts, instance by instance.
 
     Raises:
-        DikbenchError: if nothing of the selector is left to draw, or an instance has
-            `MOST_ATTEMPTS` that are rejected.
+        DikbenchError: if nothing of the selector is left to draw, or all attempts at an instance
+            are rejected.
     """
     source, waiting = scenario_id_of(given), list(numbers)
     found: dict[int, list[Attempt]] = {number: [] for number in numbers}
-    for attempt in range(MOST_ATTEMPTS):
+    for attempt in range(most):
         cells = [drawn_cell(given, number, attempt) for number in waiting]
         for number, cell, reason in zip(waiting, cells, _rejections(cells), strict=True):
             scenario, seed = cell
@@ -134,7 +143,7 @@ def draw(
     last = found[waiting[0]][-1]
     robot = parse_selector(last.scenario).parameters.get("robot", "its own")
     raise DikbenchError(
-        f"scenario {given}: robot {robot} has no instance {last.number} in {MOST_ATTEMPTS} "
+        f"scenario {given}: robot {robot} has no instance {last.number} in {most} "
         f"attempts; valid: a selector that fixes less, or other values; the last one: "
         f"{last.rejected}"
     )

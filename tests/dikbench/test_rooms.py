@@ -37,6 +37,7 @@ ROOMS: Final = (
     "tuning",
     "invariants",
     "published",
+    "advice",
     "cli",
 )
 """From the ground up: a room imports from those before it, and from nothing behind it."""

@@ -1,0 +1,1 @@
+"""Advice: the worst case of a formulation, and which formulation suits one's own arm."""
