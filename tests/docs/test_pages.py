@@ -17,7 +17,11 @@ from makers.urdf_arms import write_urdf
 
 from dikbench.study.plan import expand
 
-HELD_ELSEWHERE = {CHECKOUT / "docs" / "plug-ins.md"}
+HELD_ELSEWHERE = {
+    CHECKOUT / "docs" / "plug-ins.md",
+    CHECKOUT / "docs" / "guides" / "advice.md",
+    CHECKOUT / "docs" / "guides" / "many-machines.md",
+}
 """Pages whose commands run in a test of their own."""
 
 PARSED = ("replay", "reproduce", "tune")
