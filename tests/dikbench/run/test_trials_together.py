@@ -196,7 +196,7 @@ def test_a_run_that_is_stopped_goes_on_to_the_same_rows(
     committed: list[int] = []
 
     def stopped(store: Store, rows: Any, run: int) -> None:
-        if len(committed) == 2:
+        if committed:  # rows of blocks that end together are committed together
             raise KeyboardInterrupt
         record(store, rows, run)
         committed.append(len(rows))
