@@ -22,7 +22,7 @@ from dikbench.plugins.building import make_formulation, make_scenario
 from dikbench.plugins.finding import plugins
 from dikbench.results.folder import ResultsFolder
 from dikbench.results.store import Store
-from dikbench.run import blocks
+from dikbench.run import blocks, on_this_machine
 from dikbench.run.in_workers import RunSettings, run_trials
 from dikbench.run.runner import Interrupted
 from dikbench.run.trial_row import TrialRow, solve_of
@@ -196,12 +196,14 @@ def test_a_run_that_is_stopped_goes_on_to_the_same_rows(
     committed: list[int] = []
 
     def stopped(store: Store, rows: Any, run: int) -> None:
-        if committed:  # rows of blocks that end together are committed together
+        if len(committed) == 2:
             raise KeyboardInterrupt
         record(store, rows, run)
         committed.append(len(rows))
 
     monkeypatch.setattr(Store, "record_trials", stopped)
+    # Rows of blocks that end together are committed together: one at a time.
+    monkeypatch.setattr(on_this_machine, "BLOCKS_HANDED_AHEAD_PER_WORKER", 0.5)
     with pytest.raises(Interrupted, match=r"trials are done and kept"):
         run_here(study, tmp_path / "stopped", settings, "a test")
     done = sum(committed)
