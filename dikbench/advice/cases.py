@@ -35,7 +35,7 @@ ones take as long as all others together, and paths to the boundary end there, s
 lead beyond it nobody can do anything."""
 
 SPARE: Final = ("reach", "back-and-forth")
-"""What is run in addition on an arm that hardly any of them fits, such as one with thirteen joints."""
+"""What is run in addition on an arm that hardly any of them fits, as on one of thirteen joints."""
 
 FEWEST_FAMILIES: Final = 3
 """Fewer families than that are hardly any."""

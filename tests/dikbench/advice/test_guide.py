@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shlex
-import shutil
 from pathlib import Path
 
 import click
@@ -56,7 +55,9 @@ def test_each_command_of_the_guide_runs(
 ) -> None:
     """And leaves what it says."""
     monkeypatch.chdir(tmp_path)
-    shutil.copy(data_file("ur_description/urdf/ur5_robot.urdf"), "my_arm.urdf")
+    urdf = Path(data_file("ur_description/urdf/ur5_robot.urdf")).read_text(encoding="utf-8")
+    meshes = f"{Path(data_file('.')).absolute()}/"
+    Path("my_arm.urdf").write_text(urdf.replace("package://example-robot-data/robots/", meshes))
     Path("poses.csv").write_text(POSES)
     Path("cell.toml").write_text(CELL)
     answer = in_process(*command)
