@@ -83,9 +83,8 @@ def test_straw_laws_are_never_recommended(seed: str, tmp_path: Path) -> None:
     assert answer.exit_code == 0, answer.output
     told = answer.output.partition("What is recommended")[2].partition("\n\n")[0]
     for line in told.strip().splitlines():
-        recommended = line.partition("; next:")[0].partition("; runner-up:")[0]
-        assert "straw.py" not in recommended, line
-        assert "0 of" in line or " of " in line
+        assert "straw.py" not in line, line
+        assert " of " in line
     trials = pd.read_csv(tmp_path / "advice.csv", low_memory=False)
     ran = trials.groupby("formulation")["seed"].nunique()
     assert all(ran[name] == ran.max() for name in ran.index if "straw.py" in name)
