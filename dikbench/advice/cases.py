@@ -42,8 +42,8 @@ WITH_ACCELERATION: Final = (
     "back-and-forth",
     "reach",
 )
-"""What is run where acceleration limits are in force: of near misses and paths with corners no motion
-is known then that keeps all limits, so that they count nowhere."""
+"""What is run where acceleration limits are in force: of near misses and of paths with corners no
+motion is known then that keeps all limits, so that they count nowhere."""
 
 SPARE: Final = ("reach", "back-and-forth")
 """What is run in addition on an arm that hardly any of them fits, as on one of thirteen joints."""
