@@ -93,6 +93,8 @@ class RandomJointPath(Family):
         margin = MARGIN_RAD * robot.joint_scale
         lower = np.where(limited, lower + margin, -pi)
         upper = np.where(limited, upper - margin, pi)
+        narrow = lower > upper  # a joint with less than two margins of room stays in its middle
+        lower[narrow] = upper[narrow] = (0.5 * (lower + upper))[narrow]
         drawn = np.random.default_rng(self.number).uniform(lower, upper, (self.points, robot.nv))
         drawn[:, np.setdiff1d(np.arange(robot.nv), robot.chain)] = 0.0
         moved = pin.difference(robot.model, robot.q0, change.posture(robot, robot.q0))

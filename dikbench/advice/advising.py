@@ -149,7 +149,7 @@ def advise(
         progress("times")
         times = _times(pool, tries, chosen)
         progress("the worst case")
-        cells = 0 if "near-miss" in cases.left_out else 2 * len(MISSES) * len(SPEEDS)
+        cells = 2 * len(MISSES) * len(SPEEDS) if cases.has("near-miss") else 0
         grid = cells * tries.seconds_per_trial
 
         def left_for_search() -> float:
@@ -231,7 +231,7 @@ def _search(
     seed: int,
 ) -> tuple[Search | None, str]:
     """Search the near misses of the arm, or else its paths at a chosen speed, for the worst."""
-    box = next((name for name in ("near-miss", "speed-sweep") if name not in cases.left_out), None)
+    box = next((name for name in ("near-miss", "speed-sweep") if cases.has(name)), None)
     if box is None:
         return None, "neither near misses nor paths at a chosen speed can be made of this arm"
     number = int(left() / max(advice.tries.seconds_per_trial, 1e-3))
@@ -256,8 +256,9 @@ def _phase(
     cases: Cases, chosen: Standing, evaluate: Evaluate, left: Callable[[], float]
 ) -> tuple[pd.DataFrame | None, str]:
     """Run the grid of near misses of the arm."""
-    if "near-miss" in cases.left_out:
-        return None, cases.left_out["near-miss"]
+    if not cases.has("near-miss"):
+        unknown = "with acceleration limits no motion is known that keeps all limits"
+        return None, cases.left_out.get("near-miss", unknown)
     given = cases.given["near-miss"]
     laws = {chosen_contender(chosen): None, Contender(Selector(COMPARED), NO_SOLVER): None}
     trials = [

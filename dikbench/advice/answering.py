@@ -52,6 +52,7 @@ class Answer:
         left_behind: what ran fewer cases, and on these could not be told apart from it either.
         others: the rest, the best first.
         cases: number of cases.
+        runner_up: the best of the rest that may be recommended; None where none of them may.
         reason: why nothing is recommended; else empty.
     """
 
@@ -62,11 +63,7 @@ class Answer:
     others: tuple[Standing, ...]
     cases: int
     reason: str = ""
-
-    @property
-    def runner_up(self) -> Standing | None:
-        """The best of those that are told apart."""
-        return self.others[0] if self.others else None
+    runner_up: Standing | None = None
 
 
 def answer(need: Need, trials: pd.DataFrame) -> Answer:
@@ -107,10 +104,11 @@ def answer(need: Need, trials: pd.DataFrame) -> Answer:
         )
         order = sorted(standings.values(), key=lambda each: -each.rate)
         return Answer(need, None, (), (), tuple(order), len(found.layout.cases), reason)
-    behind = _left_behind(part, whole, found)
+    behind, may_by_few = _left_behind(part, whole, found)
     rest = [e for pair, e in standings.items() if pair not in {first, *tied, *behind}]
-    # Those that may be recommended come first: a straw law is nobody's runner-up.
-    order = sorted(rest, key=lambda each: (_pair(each) not in may, -each.rate, each.distance))
+    order = sorted(rest, key=lambda each: (-each.rate, each.distance))
+    # Who stands still keeps every limit, and is nobody's runner-up.
+    up = next((each for each in order if _pair(each) in may | may_by_few), None)
     return Answer(
         need,
         standings[first],
@@ -118,6 +116,7 @@ def answer(need: Need, trials: pd.DataFrame) -> Answer:
         tuple(standings[pair] for pair in behind),
         tuple(order),
         len(found.layout.cases),
+        runner_up=up,
     )
 
 
@@ -147,22 +146,31 @@ def _first(
     return first, sorted(tied, key=order)
 
 
-def _left_behind(part: pd.DataFrame, whole: pd.DataFrame, found: Rates) -> list[Contender]:
-    """Find who ran fewer cases, would be dependable by these, and is not told apart by them."""
+def _left_behind(
+    part: pd.DataFrame, whole: pd.DataFrame, found: Rates
+) -> tuple[list[Contender], set[Contender]]:
+    """Find who ran fewer cases, would be dependable by these, and is not told apart by them.
+
+    Returns:
+        Them, and who would be dependable by the cases that everybody ran, told apart or not.
+    """
     pairs = list(found.contenders.itertuples(index=False, name=None))
     ran = ~np.isnan(found.layout.fill(np.zeros(len(part))))
     common = np.asarray(ran.all(axis=1))
     first = part[common[found.layout.row]]
     if found.whole.all() or first.empty:
-        return []
+        return [], set()
     cells = set(zip(first["scenario"], first["seed"], strict=True))
     own = [cell in cells for cell in zip(whole["scenario"], whole["seed"], strict=True)]
     may = dependable(first, whole[own])
-    return [
+    behind = [
         pair
         for pair, is_whole, upper in zip(pairs, found.whole, found.upper, strict=True)
         if not is_whole and upper >= 0 and pair in may
     ]
+    return behind, may - {
+        pair for pair, is_whole in zip(pairs, found.whole, strict=True) if is_whole
+    }
 
 
 def _standings(part: pd.DataFrame, need: Need, found: Rates) -> dict[Contender, Standing]:

@@ -34,8 +34,19 @@ FAMILIES: Final = (
 ones take as long as all others together, and paths to the boundary end there, since of those that
 lead beyond it nobody can do anything."""
 
+WITH_ACCELERATION: Final = (
+    "random-joint-path[points=3,speed=0.5]",
+    "speed-sweep",
+    "step",
+    "joint-limit-graze",
+    "back-and-forth",
+    "reach",
+)
+"""What is run where acceleration limits are in force: of near misses and of paths with corners no
+motion is known then that keeps all limits, so that they count nowhere."""
+
 SPARE: Final = ("reach", "back-and-forth")
-"""What is run in addition on an arm that hardly any of them fits, such as one of 13 joints."""
+"""What is run in addition on an arm that hardly any of them fits, as on one of thirteen joints."""
 
 FEWEST_FAMILIES: Final = 3
 """Fewer families than that are hardly any."""
@@ -83,6 +94,10 @@ class Cases:
                     yield self._case(family, selector, number)
                 except DikbenchError as error:
                     self.left_out[family] = _in_short(str(error), selector)
+
+    def has(self, family: str) -> bool:
+        """Say whether a family is among those that are run."""
+        return family in self.given and family not in self.left_out
 
     def leave_out(self, cell: Cell, why: str) -> None:
         """Leave out from now on the family that gave a case."""
@@ -145,7 +160,8 @@ def cases_for(
         raise DikbenchError(
             f"--obstacles {obstacles}: they stand about a path; valid: together with --path"
         )
-    for family in map(parse_selector, FAMILIES):
+    names = WITH_ACCELERATION if "acceleration" in arm.parameters else FAMILIES
+    for family in map(parse_selector, names):
         values = {**family.parameters, **common}
         if family.name == "near-miss" and arm.parameters["robot"] not in ROBOTS:
             values["singularity"] = "auto"

@@ -111,7 +111,7 @@ def draw(
     given: Selector,
     numbers: Sequence[int],
     progress: Progress = lambda _: None,
-    most: int = MOST_ATTEMPTS,
+    most: int | None = None,
 ) -> list[Attempt]:
     """Draw the instances of a selector, those that are rejected again with the same robot.
 
@@ -119,7 +119,7 @@ def draw(
         given: what is fixed.
         numbers: of the instances.
         progress: is told how many more instances there are.
-        most: number of attempts at each.
+        most: number of attempts at each; default: `MOST_ATTEMPTS`.
 
     Returns:
         All attempts, instance by instance.
@@ -130,6 +130,7 @@ def draw(
     """
     source, waiting = scenario_id_of(given), list(numbers)
     found: dict[int, list[Attempt]] = {number: [] for number in numbers}
+    most = MOST_ATTEMPTS if most is None else most
     for attempt in range(most):
         cells = [drawn_cell(given, number, attempt) for number in waiting]
         for number, cell, reason in zip(waiting, cells, _rejections(cells), strict=True):

@@ -43,16 +43,16 @@ def some(values: Mapping[str, Any], share: float) -> dict[str, list[Any]]:
 
 def test_who_does_most_is_recommended_with_its_numbers() -> None:
     """And who is told apart is not tied."""
-    found = answer(ON_PATH, rows({"good": GOOD, "half": some(STANDS, 0.5)}))
+    found = answer(ON_PATH, rows({"good": GOOD, "half": some(STANDS, 0.4)}))
     assert found.first is not None
     assert (found.first.formulation, found.first.failed, found.first.runs) == ("good", 0, 16)
     assert found.tied == ()
     assert found.runner_up is not None
     assert found.runner_up.formulation == "half"
-    assert found.runner_up.failed == 8
+    assert found.runner_up.failed == 6
     text = answer_in_words(found)
     assert "`good`: 0 of 16 runs" in text
-    assert "`half` (8 of 16 runs)" in text
+    assert "`half` (6 of 16 runs)" in text
 
 
 def test_equal_laws_are_tied_whatever_their_names() -> None:
@@ -86,8 +86,9 @@ def test_who_stands_still_or_ignores_limits_is_never_recommended() -> None:
         assert {each.formulation for each in named if each is not None} <= {"good", "poor"}
         assert found.first is not None
         assert found.first.formulation == "good"
-        if found.runner_up is not None and not found.tied:
-            assert found.runner_up.formulation != "idle"
+        assert found.runner_up is None or found.runner_up.formulation == "poor"
+        assert "idle" not in answer_in_words(found)
+        assert "reckless" not in answer_in_words(found)
 
 
 def test_straw_laws_change_nothing_about_the_others() -> None:
@@ -98,6 +99,7 @@ def test_straw_laws_change_nothing_about_the_others() -> None:
         beside = answer(need, rows({**honest, "idle": STANDS, "reckless": some(BROKEN, 0.3)}))
         assert alone.first == beside.first
         assert alone.tied == beside.tied
+        assert alone.runner_up == beside.runner_up
 
 
 def test_where_all_are_straw_nothing_is_recommended() -> None:

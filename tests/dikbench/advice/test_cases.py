@@ -78,3 +78,12 @@ def test_an_arm_that_hardly_any_family_fits_has_spare_ones(tmp_path: Path) -> No
         cases.left_out[family] = "does not fit"
     names = [scenario.name for scenario, _ in islice(cases, 4)]
     assert names == ["reach", "back-and-forth", "reach", "back-and-forth"]
+
+
+def test_with_acceleration_limits_there_are_cases_that_something_can_do(tmp_path: Path) -> None:
+    """Of five in turn most, and none of a family of which nothing is known."""
+    cases = cases_for(look_at("ur5", acceleration="10"), 0.01, 0, None, None, tmp_path)
+    made = [make_scenario(*cell) for cell in islice(cases, 6)]
+    assert all(each.robot.limits.acceleration is not None for each in made)
+    assert sum(each.feasible in ("time", "path") for each in made) >= 4
+    assert not cases.has("near-miss")

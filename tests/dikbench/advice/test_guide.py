@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shlex
-import shutil
 from pathlib import Path
 
 import click
@@ -56,7 +55,9 @@ def test_each_command_of_the_guide_runs(
 ) -> None:
     """And leaves what it says."""
     monkeypatch.chdir(tmp_path)
-    shutil.copy(data_file("ur_description/urdf/ur5_robot.urdf"), "my_arm.urdf")
+    urdf = Path(data_file("ur_description/urdf/ur5_robot.urdf")).read_text(encoding="utf-8")
+    meshes = f"{Path(data_file('.')).absolute()}/"
+    Path("my_arm.urdf").write_text(urdf.replace("package://example-robot-data/robots/", meshes))
     Path("poses.csv").write_text(POSES)
     Path("cell.toml").write_text(CELL)
     answer = in_process(*command)
@@ -82,9 +83,8 @@ def test_straw_laws_are_never_recommended(seed: str, tmp_path: Path) -> None:
     assert answer.exit_code == 0, answer.output
     told = answer.output.partition("What is recommended")[2].partition("\n\n")[0]
     for line in told.strip().splitlines():
-        recommended = line.partition("; next:")[0].partition("; runner-up:")[0]
-        assert "straw.py" not in recommended, line
-        assert "0 of" in line or " of " in line
+        assert "straw.py" not in line, line
+        assert " of " in line
     trials = pd.read_csv(tmp_path / "advice.csv", low_memory=False)
     ran = trials.groupby("formulation")["seed"].nunique()
     assert all(ran[name] == ran.max() for name in ran.index if "straw.py" in name)

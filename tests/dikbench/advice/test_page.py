@@ -25,13 +25,13 @@ LAWS = ("qp", "dls", "<b>law</b>")
 
 
 def made_up(folder: Path) -> tuple[list[tuple[str, list[str]]], str, str]:
-    """Present advice from rows that are made up: `qp` does all, `dls` leaves half of the paths."""
+    """Present advice from rows that are made up: `qp` does all, `dls` leaves three of the paths."""
     rows: list[dict[str, Any]] = []
     cases = [(Selector("near-miss", {"robot": "ur5", "speed": f"0.{n}"}), n) for n in range(1, 9)]
     for scenario, seed in cases:
         for law in LAWS:
             for reference, plant in (("path", "ideal"), ("time", "ideal"), ("time", DISTURBED)):
-                failed = law != "qp" and seed % 2
+                failed = law != "qp" and seed % 3 == 1
                 rows.append(
                     {
                         **FAULTLESS,
@@ -73,7 +73,7 @@ def test_the_sentences_have_the_numbers_of_the_rows(tmp_path: Path) -> None:
     chapters, program, _ = made_up(tmp_path)
     lines = dict(chapters)
     assert "`qp`: 0 of 8 runs" in lines["What is recommended"][0]
-    assert "`dls` (4 of 8 runs)" in lines["What is recommended"][0]
+    assert "`dls` (3 of 8 runs)" in lines["What is recommended"][0]
     [will_not] = [lines[name] for name in lines if "will not do" in name]
     assert "it did its job in 8 of 8 runs" in will_not[0]
     assert "2 steps late, it did its job in 8 of 8 runs" in will_not[-1]
