@@ -331,3 +331,12 @@ def test_joints_elsewhere_change_nothing_and_cost_little(tmp_path: Path) -> None
     assert np.ptp(wide.motion.q[:, resting], axis=0).max() == 0.0
     assert all(claim.holds for claim in wide.certificate.claims)
     assert len(start) == len(wide.robot.chain)
+
+
+def test_a_random_path_says_that_a_joint_has_no_room(tmp_path: Path) -> None:
+    """Between limits nearer than two margins it stays in the middle, which the certificate tells."""
+    file = Path(write_urdf(tmp_path / "narrow.urdf"))
+    first = 'lower="-2.8" upper="2.8"'
+    file.write_text(file.read_text().replace(first, 'lower="-0.05" upper="0.07"', 1))
+    said = scenario_error(f"random-joint-path[robot={file},frame=tool]")
+    assert "position margin [rad] = 0.06, must be >= 0.099" in said
