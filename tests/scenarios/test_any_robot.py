@@ -334,7 +334,7 @@ def test_joints_elsewhere_change_nothing_and_cost_little(tmp_path: Path) -> None
 
 
 def test_a_random_path_says_that_a_joint_has_no_room(tmp_path: Path) -> None:
-    """Between limits nearer than two margins it stays in the middle, which the certificate tells."""
+    """Between limits nearer than two margins it stays in the middle: the certificate tells it."""
     file = Path(write_urdf(tmp_path / "narrow.urdf"))
     first = 'lower="-2.8" upper="2.8"'
     file.write_text(file.read_text().replace(first, 'lower="-0.05" upper="0.07"', 1))
