@@ -224,7 +224,8 @@ def _followed(arm: Robot, reference: Reference, instants: Array, near: Array, ro
             line = rows.lines[_out_of_reach(arm, q[-1], rows, rows.towards(tau))]
             raise DikbenchError(
                 f"pose file {rows.file}, line {line}: the pose or the path to it is out of reach "
-                f"of robot {arm.name} (at {tau:.3g} s)"
+                f"of robot {arm.name} (at {tau:.3g} s); valid: x, y, z in metres, in the frame of "
+                "the robot's base, where the arm comes"
             ) from None
     return np.array(q[1:])
 

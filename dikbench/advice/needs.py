@@ -18,7 +18,7 @@ Kind = Literal["on-path", "on-time", "limits"]
 DEFAULTS: Final = ("on-path=5mm", "on-time=5mm", "limits")
 """What is answered where nothing is asked for."""
 
-UNITS: Final = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
+UNITS: Final = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
 
 VALID: Final = "valid: on-path=1mm, on-time=5mm or limits"
 
@@ -86,9 +86,13 @@ def parsed_need(text: str) -> Need:
             raise DikbenchError(f"need {text!r}: limits has no value; {VALID}")
         return Need("limits")
     try:
-        tolerance = float(match["value"] or "5e-3") * UNITS[match["unit"] or ""]
+        unit = match["unit"] if match["value"] else "m"
+        tolerance = float(match["value"] or "5e-3") * UNITS[unit]
     except (ValueError, KeyError):
         tolerance = 0.0
     if not 0 < tolerance <= 1:
-        raise DikbenchError(f"need {text!r}: its distance must be above 0 and at most 1 m; {VALID}")
+        raise DikbenchError(
+            f"need {text!r}: it takes a distance above 0 and at most 1 m, in "
+            f"{', '.join(UNITS)}; {VALID}"
+        )
     return Need("on-path" if kind == "on-path" else "on-time", tolerance)

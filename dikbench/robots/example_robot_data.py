@@ -11,6 +11,7 @@ from typing import Any
 import pinocchio as pin
 
 from dikbench.errors import DikbenchError
+from dikbench.robots.reduced_model import reduced_geometry, reduced_model
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class DataModel:
         model = self._whole()
         if not self.moving:
             return model
-        return pin.buildReducedModel(model, self._locked(model), pin.neutral(model))
+        return reduced_model(model, self._locked(model), pin.neutral(model))
 
     def visuals(self) -> Any:
         """Build its visual geometry with meshes (`pinocchio.GeometryModel`)."""
@@ -43,7 +44,7 @@ class DataModel:
         visuals = urdf_visuals(model, data_file(self.urdf), _data_folder().parents[1])
         if not self.moving:
             return visuals
-        return pin.buildReducedModel(model, visuals, self._locked(model), pin.neutral(model))[1]
+        return reduced_geometry(model, visuals, self._locked(model), pin.neutral(model))
 
     def _whole(self) -> Any:
         file = data_file(self.urdf)

@@ -20,6 +20,7 @@ from dikbench.robots.example_robot_data import DataModel, data_file, urdf_visual
 from dikbench.robots.kinematics import Kinematics
 from dikbench.robots.mimic import with_followers
 from dikbench.robots.plugged import EVERY_ROBOT, robot_entry
+from dikbench.robots.reduced_model import reduced_geometry, reduced_model
 from dikbench.robots.robot import Robot, checked_vector, frame_id, model_limits
 from dikbench.robots.safe_start import safe_start
 from dikbench.robots.task_rows import parsed_rows
@@ -261,7 +262,7 @@ def _with_locked(robot: Robot, locked: Mapping[str, float | None]) -> Robot:
                 f"robot {robot.name}: lock={name}={value:g} is outside the position limits, "
                 f"{position.lower[k]:g} to {position.upper[k]:g}"
             )
-    reduced = pin.buildReducedModel(model, sorted(indices), q)
+    reduced = reduced_model(model, sorted(indices), q)
     kept_q = np.setdiff1d(np.arange(model.nq), list(gone_q))
     kept_v = np.setdiff1d(np.arange(model.nv), list(gone_v))
     if not len(kept_v):
@@ -278,7 +279,7 @@ def _with_locked(robot: Robot, locked: Mapping[str, float | None]) -> Robot:
 
 
 def _reduced_visuals(model: Any, visuals: Callable[[], Any], locked: list[int], q: Array) -> Any:
-    return pin.buildReducedModel(model, visuals(), locked, q)[1]
+    return reduced_geometry(model, visuals(), locked, q)
 
 
 def _movable_rows(robot: Robot) -> tuple[int, ...]:

@@ -27,14 +27,15 @@ def store_for(folder: ResultsFolder, study: Study) -> Iterator[Store]:
 def _check_same(folder: ResultsFolder, store: Store, study: Study) -> None:
     """Check that the rows of a study may stand beside those of the folder.
 
-    What was selected by options may be added to any study but one that was run with straw laws.
+    What was selected by options may be added to any study but one that was run with straw laws; a
+    study is not added to what was selected.
     """
     try:
         there = str(store.manifest()["study"].get("name") or "")
     except DikbenchError:  # nothing was run in it
         return
     names = {there, study.name}
-    alone = SELECTED not in names or any(name.startswith(CHECKED) for name in names)
+    alone = study.name != SELECTED or any(name.startswith(CHECKED) for name in names)
     if "" not in names and len(names) > 1 and alone:
         raise DikbenchError(
             f"output folder {folder.path} holds the results of study {there!r}, which those of "

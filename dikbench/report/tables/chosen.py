@@ -71,6 +71,8 @@ def read_display_names(file: Path) -> DisplayNames:
     """
     try:
         found = tomllib.loads(file.read_text(encoding="utf-8"))
+        if unknown_tables := found.keys() - DisplayNames.__dataclass_fields__.keys():
+            raise ValueError(f"unknown table {min(unknown_tables)!r}")
         return msgspec.convert(found, DisplayNames, strict=True)
     except (OSError, ValueError, msgspec.ValidationError) as error:
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)

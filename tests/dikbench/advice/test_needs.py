@@ -18,21 +18,32 @@ from dikbench.errors import DikbenchError
     ("text", "need"),
     [
         ("on-path=1mm", Need("on-path", 0.001)),
-        ("on-path=0.002", Need("on-path", 0.002)),
+        ("on-path=0.002m", Need("on-path", 0.002)),
         ("on-time=2 cm", Need("on-time", 0.02)),
         ("on-path", Need("on-path", 0.005)),
         ("limits", Need("limits")),
     ],
 )
 def test_a_need_is_read(text: str, need: Need) -> None:
-    """With its unit; metres where none is given."""
+    """With its unit; 5 mm where no distance is given."""
     found = parsed_need(text)
     assert found.kind == need.kind
     assert found.tolerance == pytest.approx(need.tolerance)
 
 
 @pytest.mark.parametrize(
-    "text", ["", "fast", "on-path=", "on-path=1 mile", "on-path=-1mm", "limits=3", "on-path=nan"]
+    "text",
+    [
+        "",
+        "fast",
+        "on-path=",
+        "on-path=1 mile",
+        "on-path=1",
+        "on-time=0.002",
+        "on-path=-1mm",
+        "limits=3",
+        "on-path=nan",
+    ],
 )
 def test_what_is_no_need_is_one_line(text: str) -> None:
     """And says what would be valid."""

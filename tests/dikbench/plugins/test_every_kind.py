@@ -65,7 +65,8 @@ NUMBER = 3
 
 
 CACHES: tuple[Any, ...] = (
-    source.digest_of_file, source._imported, identity._solver, identity._formulation, scenario_id,
+    source.digest_of_file, source._imported, identity._solver, identity._formulation,
+    identity._plant, scenario_id,
 )  # fmt: skip
 
 
