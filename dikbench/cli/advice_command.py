@@ -124,6 +124,7 @@ def advise(
     from dikbench.advice.trying import Clock, candidates
     from dikbench.run.in_workers import RunSettings
     from dikbench.run.pool import available_cores
+    from dikbench.run.progress_display import BudgetDisplay
 
     clock = Clock(budget)
     asked = [parsed_need(text) for text in needs or DEFAULTS]
@@ -135,10 +136,12 @@ def advise(
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a stop like Ctrl-C
     again = shlex.join(["dikbench", *sys.argv[1:]])
 
-    def say(what: str) -> None:
-        click.echo(f"{100 * clock.spent:3.0f} % of {budget:g} s: {what}", err=True)
+    with BudgetDisplay(f"{budget:g} s") as display:
 
-    found = advise_on(arm, dt, cases, contenders, asked, clock, seed, settings, say)
+        def say(what: str) -> None:
+            display.tell(clock.spent, what)
+
+        found = advise_on(arm, dt, cases, contenders, asked, clock, seed, settings, say)
     page = html or folder / "advice.html"
     chapters, program = present(found, folder, page, settings, again)
     for heading, lines in chapters:

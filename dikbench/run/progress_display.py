@@ -53,3 +53,41 @@ class ProgressDisplay:
         """Close the bar."""
         if self._bar is not None:
             self._bar.close()
+
+
+class BudgetDisplay:
+    """Shows the share of a budget that is spent, and what is done: a bar, or a line every 5 s."""
+
+    def __init__(self, budget: str) -> None:
+        self._budget = budget
+        self._last = -SECONDS_BETWEEN_LINES
+        self._bar = (
+            tqdm(total=100, desc=f"of {budget}", unit="%", bar_format="{l_bar}{bar}| {postfix}")
+            if sys.stderr.isatty()
+            else None
+        )
+
+    def __enter__(self) -> Self:
+        """Return the display."""
+        return self
+
+    def tell(self, spent: float, what: str) -> None:
+        """Tell what is done, and the share of the budget, 0 to 1, that is spent."""
+        if self._bar is not None:
+            self._bar.n = min(100, round(100 * spent))
+            self._bar.set_postfix_str(what)
+            return
+        now = time.monotonic()
+        if now - self._last >= SECONDS_BETWEEN_LINES:
+            self._last = now
+            print(f"{100 * spent:3.0f} % of {self._budget}: {what}", file=sys.stderr, flush=True)
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close the bar."""
+        if self._bar is not None:
+            self._bar.close()
