@@ -21,7 +21,7 @@ Engine = Literal["alone", "lockstep"]
 EngineChoice = Literal["auto", "alone", "lockstep"]
 
 LEAST_ROWS: Final = 64
-"""Lockstep pays from so many trials of one family, robot and plant on."""
+"""Lockstep pays from so many trials of one formulation, family, robot and plant on."""
 
 MOST_SCENARIOS: Final = 128
 """Largest number of scenarios of a block ..."""
@@ -42,8 +42,9 @@ def engine_of(planned: Sequence[PlannedTrial], choice: EngineChoice, store: Stor
     Args:
         planned: its trials.
         choice: the engine, or `auto`: lockstep where the references move with the clock, and
-            `LEAST_ROWS` trials, on average, of formulations that answer many at once share family,
-            robot and plant. Where a reference waits, runs are of very different lengths, and the
+            `LEAST_ROWS` trials, on average, of each formulation that answers many at once share
+            family, robot and plant: a thousand formulations on one scenario are a thousand groups
+            of one. Where a reference waits, runs are of very different lengths, and the
             last ones of a lockstep cost as much as all.
         store: of the results.
 
@@ -67,7 +68,7 @@ def engine_of(planned: Sequence[PlannedTrial], choice: EngineChoice, store: Stor
     if any(trial.reference != "time" for trial in trials):
         return "alone"
     kinds = Counter(
-        (*family_and_robot(trial.scenario), trial.plant)
+        (trial.formulation, trial.solver, *family_and_robot(trial.scenario), trial.plant)
         for trial in trials
         if trial.formulation.name not in ORACLES and is_batched(make_formulation(trial.formulation))
     )

@@ -224,6 +224,10 @@ def test_the_engine_is_chosen_once(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(blocks, "LEAST_ROWS", 5)
     few = msgspec.structs.replace(_study(["dls"], NEAR_MISSES[1:]), timing=None)
     many = msgspec.structs.replace(_study(["dls"]), seeds=tuple(range(5)), timing=None)
+    laws = [f"dls[damping={damping}]" for damping in (0.1, 0.2, 0.3, 0.4)]
+    one_each = msgspec.structs.replace(_study(laws, NEAR_MISSES[1:]), timing=None, seeds=(0, 1))
+    assert blocks.engine_of(expand(one_each), "auto", Store(tmp_path / "none.sqlite")) == "alone"
+    assert blocks.engine_of(expand(many), "auto", Store(tmp_path / "none.sqlite")) == "lockstep"
     for study, engine in ((few, "alone"), (many, "lockstep")):
         out = tmp_path / engine
         run_here(study, out, RunSettings(jobs=1, traces="none"), "a test")
