@@ -106,7 +106,8 @@ def times_in_words(advice: Advice) -> list[str]:
     if lines:
         lines.append(
             "a call is the formulation with its solver; `solve_dik` checks all that it is given "
-            "and computes the kinematics as well, which takes hundreds of us more"
+            "and computes the kinematics as well, which takes some 0.1 ms more, and with a program "
+            "longer"
         )
     return lines
 

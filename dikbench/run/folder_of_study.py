@@ -31,13 +31,18 @@ def _check_same(folder: ResultsFolder, store: Store, study: Study) -> None:
     study is not added to what was selected.
     """
     try:
-        there = str(store.manifest()["study"].get("name") or "")
+        runs = store.runs()
     except DikbenchError:  # nothing was run in it
         return
-    names = {there, study.name}
-    alone = study.name != SELECTED or any(name.startswith(CHECKED) for name in names)
-    if "" not in names and len(names) > 1 and alone:
+    names = {str(run["study"].get("name") or "") for run in runs} - {""}
+    if study.name == SELECTED:
+        others = {name for name in names if name.startswith(CHECKED)}
+    elif study.name in names:
+        others = names - {study.name, SELECTED}
+    else:
+        others = names if study.name else set()
+    if others:
         raise DikbenchError(
-            f"output folder {folder.path} holds the results of study {there!r}, which those of "
-            f"{study.name!r} would be mixed with; valid: another folder with --out"
+            f"output folder {folder.path} holds the results of study {min(others)!r}, which those "
+            f"of {study.name!r} would be mixed with; valid: another folder with --out"
         )

@@ -100,10 +100,11 @@ class PeerEmbodik(Peer):
             if _apart(undamped, velocity):
                 causes.append("damps singular values near 0.1")
         ours = SaturationInNullSpace()
-        if _apart(undamped, ours.velocity(problem, NO_SOLVER)):
+        both = ours.velocity(problem, NO_SOLVER)
+        if _apart(undamped, both):
             alone = [task for task in problem.tasks if not isinstance(task, LinearizedJointTask)]
             first = ours.velocity(msgspec.structs.replace(problem, tasks=alone), NO_SOLVER)
-            if len(alone) < len(problem.tasks):
+            if _apart(first, both):
                 causes.append("is asked for the first task alone")
             if _apart(undamped, first):
                 scaled = _how_scaled(problem, undamped, first)

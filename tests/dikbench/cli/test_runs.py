@@ -100,7 +100,8 @@ def test_a_folder_holds_one_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     """Another study, its times and a check with straw laws are refused in one line.
 
     The same study goes on in it, and what is selected by options may be added, but not to what was
-    run with straw laws: its tables would be taken for those of a study.
+    run with straw laws: its tables would be taken for those of a study. Nor is a study added to
+    what was selected, unless its own rows are there.
     """
     monkeypatch.chdir(tmp_path)
     for name in ("mine", "check-mine"):
@@ -128,6 +129,12 @@ def test_a_folder_holds_one_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert Path("out/trials.csv").read_bytes() == before
     assert ran("mine.toml") == 1
     assert ran(formulations="pinv", scenarios="reach[duration=0.1]", plants="ideal") == 3
+    assert ran("mine.toml") == 3
+    refused("mine", "run", "other.toml")
+    shutil.rmtree("out")
+    ran(formulations="pinv", scenarios="reach[duration=0.1]", plants="ideal")
+    refused("selection", "run", "mine.toml")
+    ran(formulations="dls", scenarios="reach[duration=0.1]", plants="ideal")
     shutil.rmtree("out")
     ran("check-mine.toml")  # as the check names what it runs
     refused("check-mine", "run", "mine.toml")

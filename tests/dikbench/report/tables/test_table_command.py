@@ -100,7 +100,9 @@ def test_mistakes_are_one_line(folder: Path, options: tuple[str, ...], said: str
     assert len(answer.stderr.splitlines()) == 1
 
 
-@pytest.mark.parametrize("text", ["formulations = 3", "[columns]\nall_percent = 3", "[[["])
+@pytest.mark.parametrize(
+    "text", ["formulations = 3", "[columns]\nall_percent = 3", "[[[", "[formulation]\na = 'b'"]
+)
 def test_a_file_of_names_that_is_none_is_one_line(folder: Path, tmp_path: Path, text: str) -> None:
     """It says what would be valid."""
     names = tmp_path / "names.toml"
